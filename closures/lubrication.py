@@ -135,7 +135,7 @@ def film_potential_change(gap: float, change: float, minimum_gap: float, cutoff_
 def speed_after_film(
     speed: float,
     gap: float,
-    accounted_gap: float,
+    integrated_gap: float,
     step: float,
     strength_per_mass: float,
     minimum_gap: float,
@@ -147,7 +147,7 @@ def speed_after_film(
 
     speed              u_0, rate of the gap before, positive apart [m/s]
     gap                h, at the start of the step [m]
-    accounted_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
+    integrated_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
     step               dt [s]
     strength_per_mass  B = A/m* [m/s]
     minimum_gap        h_min [m]
@@ -161,7 +161,7 @@ def speed_after_film(
     >>> round(stop / math.exp(-2.0), 6)
     1.0
     """
-    total = speed + strength_per_mass * film_potential_change(gap, accounted_gap - gap, minimum_gap, cutoff_gap)
+    total = speed + strength_per_mass * film_potential_change(gap, integrated_gap - gap, minimum_gap, cutoff_gap)
     guess = total / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
     if abs(step * guess) < 1e-7 * gap:
         return guess  # the change of the resistance is below rounding
@@ -192,7 +192,7 @@ def speed_after_film(
 def speed_after_short_step(
     speed: float,
     gap: float,
-    accounted_gap: float,
+    integrated_gap: float,
     step: float,
     strength_per_mass: float,
     minimum_gap: float,
@@ -207,7 +207,7 @@ def speed_after_short_step(
 
     speed              u_0, rate of the gap before, positive apart [m/s]
     gap                h, at the start of the step [m]
-    accounted_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
+    integrated_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
     step               dt [s]
     strength_per_mass  B = A/m* [m/s]
     minimum_gap        h_min [m]
@@ -222,25 +222,25 @@ def speed_after_short_step(
     (True, nan)
     """
     inside = gap > minimum_gap
-    weight, total = step * strength_per_mass, accounted_gap + gap
+    weight, total = step * strength_per_mass, integrated_gap + gap
     # a u^2 + b u = c: the equation times h_1 + h_a in the film, times 2 h_min^2 below h_min
-    now, before, square = max(gap, 0.0), max(accounted_gap, 0.0), 2.0 * minimum_gap * minimum_gap
+    now, before, square = max(gap, 0.0), max(integrated_gap, 0.0), 2.0 * minimum_gap * minimum_gap
     returned = strength_per_mass * (before - now) * (before + now)
     a = step if inside else (step * weight if gap > 0.0 else 0.0)
     b = total + 2.0 * weight - step * speed if inside else square + 2.0 * weight * now
-    c = speed * total + 2.0 * strength_per_mass * (accounted_gap - gap) if inside else square * speed + returned
+    c = speed * total + 2.0 * strength_per_mass * (integrated_gap - gap) if inside else square * speed + returned
     discriminant = b * b + 4.0 * a * c
     guess = 2.0 * c / (b + math.sqrt(max(discriminant, 0.0)))
     # the rest of the series, by one step of Halley's method
     end = gap + step * guess
-    begin, change = (accounted_gap if inside else minimum_gap), gap - accounted_gap + step * guess
+    begin, change = (integrated_gap if inside else minimum_gap), gap - integrated_gap + step * guess
     excess = guess - speed + strength_per_mass * short_film_potential(begin, change, minimum_gap)
     inverse = 1.0 / (end * (end + weight) if inside else 1.0)
     correction = excess * end * end * inverse
     bent = 0.5 * step * weight * correction * inverse
     guess -= correction * (1.0 - bent) if inside else 0.0
     end = gap + step * guess
-    low, high = min(gap, end, accounted_gap), max(gap, end, accounted_gap)
+    low, high = min(gap, end, integrated_gap), max(gap, end, integrated_gap)
     if inside:
         shortly = low > minimum_gap and high < cutoff_gap and high - low <= 0.1 * low
     else:

@@ -10,7 +10,7 @@ from test_ghosts import DRY, GLASS, STEEL, WET, state
 from cfddem.backend.communicator import Communicator
 from cfddem.data.fields import Field
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import Divided
+from cfddem.particles.ghosts import DividedDomain
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -75,8 +75,8 @@ def bed(communicator: Communicator, kind: str, count: int, steps: int, without: 
 
 def leave_out(ghosts: Any, what: str) -> None:
     """Break the exchange between ranks, to see whether a test notices."""
-    if isinstance(ghosts, Divided) and what == "memory":
+    if isinstance(ghosts, DividedDomain) and what == "memory":
         ghosts.recall = lambda edges: None  # type: ignore[method-assign]
-    if isinstance(ghosts, Divided) and what == "film":
+    if isinstance(ghosts, DividedDomain) and what == "film":
         refresh = ghosts.refresh
         ghosts.refresh = lambda phase: None if phase == "film" else refresh(phase)  # type: ignore[method-assign]

@@ -134,7 +134,7 @@ def _compiled_law(law: FunctionType, mark: str) -> Any:
     return inline(twin)
 
 
-def adapted(law: Callable[..., Any], arguments: str, sources: Mapping[str, str], result: str = "{}") -> Any:
+def bind_arguments(law: Callable[..., Any], arguments: str, sources: Mapping[str, str], result: str = "{}") -> Any:
     """A law with named arguments as a template calls it.
 
     law        takes some of the names of `sources`, in any order
@@ -147,10 +147,10 @@ def adapted(law: Callable[..., Any], arguments: str, sources: Mapping[str, str],
         if name not in sources:
             raise InputError(f"argument of {law.__name__}", name, f"one of {', '.join(sources)}")
     call = result.format(f"law({', '.join(sources[name] for name in taken)})")
-    return written(f"def adapter({arguments}):\n    return {call}\n", law=callable_in_loops(law))
+    return compile_source(f"def adapter({arguments}):\n    return {call}\n", law=callable_in_loops(law))
 
 
-def written(source: str, how: Callable[..., Any] = inline, **names: Any) -> Any:
+def compile_source(source: str, how: Callable[..., Any] = inline, **names: Any) -> Any:
     """The function of a source text, compiled.
 
     how    inline, or another way to compile

@@ -16,8 +16,8 @@ size, so that small particles among large ones exchange with their own surroundi
 are adjoint, and so are those of all together.
 
 Where several ranks share the grid, each deposits its own particles on the cells around them
-(:class:`cfddem.coupling.reach.Reach`), which are then added to those of their owners; a gather takes them from there.
-Deposit and gather stay adjoint.
+(:class:`cfddem.coupling.ghost_deposit.GhostDeposit`), which are then added to those of their owners; a gather takes
+them from there. Deposit and gather stay adjoint.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ import numpy as np
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
+from cfddem.coupling.ghost_deposit import GhostDeposit
 from cfddem.coupling.merged_cells import merged_cells
-from cfddem.coupling.reach import Reach
 from cfddem.coupling.two_sides import sides_of
 from cfddem.fluid.grid import AT_CENTRES, HIGH, LOW, Array, Grid, sample
 from cfddem.fluid.halo import Halo
-from cfddem.particles.ghosts import Whole
+from cfddem.particles.ghosts import SingleDomain
 from cfddem.particles.state import sphere_volume
 
 MAPPINGS = ("linear", "centroid", "divided")
@@ -53,7 +53,7 @@ SLAB = 4
 class Stencil(NamedTuple):
     """Cells on which particles deposit: for each of their equal pieces a cell and the seven beside, above and behind.
 
-    A layer of cells around the grid takes part, see :class:`cfddem.coupling.reach.Homes`.
+    A layer of cells around the grid takes part, see :class:`cfddem.coupling.ghost_deposit.GhostOwners`.
     """
 
     first: np.ndarray  # (N, pieces) uint32, flat index of the lowest of the eight cells
@@ -102,7 +102,7 @@ class FilterKernel:
         sizes: Sequence[tuple[float, float]] = (),
         twice: bool = False,
         parts: Sequence[int] = (1, 1, 1),
-        owners: Whole | None = None,
+        owners: SingleDomain | None = None,
     ) -> None:
         if mapping not in MAPPINGS:
             raise InputError("laws.mapping", mapping, nearest(mapping, MAPPINGS))
@@ -114,7 +114,7 @@ class FilterKernel:
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
         self._merged = merged_cells(grid, self.periodic)
-        self.owners, self._parts = owners or Whole(), parts
+        self.owners, self._parts = owners or SingleDomain(), parts
         self._take_reach()
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
@@ -128,7 +128,7 @@ class FilterKernel:
 
     def _take_reach(self) -> None:
         """Find the cells that particles reach by the present division of space."""
-        self.reach = Reach(self._merged.grid, self.periodic, self._parts, self.owners.division)
+        self.reach = GhostDeposit(self._merged.grid, self.periodic, self._parts, self.owners.division)
         self._axes = self.reach.axes()
         self._sides = sides_of(self.grid, self._merged.grid, self.reach.homes(), self._axes)
         self._homes = self._sides.homes

@@ -34,7 +34,7 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
 from cfddem.backend.errors import InputError
-from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field, Table
@@ -239,7 +239,7 @@ class ExchangeLaw:
 
     def __init__(self, law: Law) -> None:
         self.law, self.outside = law, 0
-        number = adapted(law.function, ", ".join(HEAT_ARGUMENTS), {name: name for name in HEAT_ARGUMENTS})
+        number = bind_arguments(law.function, ", ".join(HEAT_ARGUMENTS), {name: name for name in HEAT_ARGUMENTS})
         self._loop = specialise(_numbers, {"exchange_number": number})
         self._ranges = np.array([law.ranges.get(name, (-math.inf, math.inf)) for name in HEAT_ARGUMENTS])
 

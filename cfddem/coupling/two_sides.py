@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from cfddem.coupling.ghost_deposit import GhostOwners
 from cfddem.coupling.kernel_loops import Axes
-from cfddem.coupling.reach import Homes
 from cfddem.fluid.grid import Array, Grid
-from cfddem.fluid.thin_walls import ASIDE, Divided, ThinWall
+from cfddem.fluid.thin_walls import ASIDE, ThinWall, TwoSided
 
 BESIDE = 3.0
 """Cells from a thin wall within which cells may have other homes [-]."""
@@ -27,7 +27,7 @@ class OneSide:
     homes  of the cells and of the layer around them
     """
 
-    def __init__(self, homes: Homes) -> None:
+    def __init__(self, homes: GhostOwners) -> None:
         self.homes = homes
 
     def choose(self, position: Array, first: np.ndarray) -> None:
@@ -43,7 +43,7 @@ class TwoSides(OneSide):
     axes   of the cells
     """
 
-    def __init__(self, grid: Grid, cells: Grid, homes: Homes, axes: Axes) -> None:
+    def __init__(self, grid: Grid, cells: Grid, homes: GhostOwners, axes: Axes) -> None:
         self._thin: ThinWall = grid.walls.thin
         spacing = np.array(grid.spacing)
         centres = np.stack([np.ravel(each) for each in np.broadcast_arrays(*grid.centres())], axis=-1) + ASIDE * spacing
@@ -60,7 +60,7 @@ class TwoSides(OneSide):
             of_side.append(home[homes.of_layered])
         both = np.concatenate(of_side)
         order = np.argsort(both, kind="stable")
-        super().__init__(Homes(both, order, np.searchsorted(both[order], np.arange(away.size + 1))))
+        super().__init__(GhostOwners(both, order, np.searchsorted(both[order], np.arange(away.size + 1))))
         shape = tuple(int(n) + 2 for n in axes.cells[::-1])
         differs: Any = (of_side[0] != of_side[1]).reshape(shape)
         for axis in range(3):  # a particle beside such a cell, which is one of its eight
@@ -73,6 +73,6 @@ class TwoSides(OneSide):
         first[rows[self._thin.side(position[rows]) < 0.0]] += np.uint32(self._count)
 
 
-def sides_of(grid: Grid, cells: Grid, homes: Homes, axes: Axes) -> OneSide:
+def sides_of(grid: Grid, cells: Grid, homes: GhostOwners, axes: Axes) -> OneSide:
     """The cells of particles on both sides of thin walls, or of all particles where a grid has none."""
-    return TwoSides(grid, cells, homes, axes) if isinstance(grid.walls, Divided) else OneSide(homes)
+    return TwoSides(grid, cells, homes, axes) if isinstance(grid.walls, TwoSided) else OneSide(homes)

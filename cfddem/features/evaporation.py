@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.law_set import adapted, specialise
+from cfddem.backend.law_set import bind_arguments, specialise
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.evaporation_keys import Evaporation
@@ -74,7 +74,7 @@ class EvaporationOfLiquid(CaseFeature):
         self.gains = Vapour.is_in(case)
         law = case.laws.drying_law
         assert law is not None
-        share = adapted(law.function, ", ".join(DRYING_ARGUMENTS), {name: name for name in DRYING_ARGUMENTS})
+        share = bind_arguments(law.function, ", ".join(DRYING_ARGUMENTS), {name: name for name in DRYING_ARGUMENTS})
         self._evaporate = specialise(evaporate, {"drying_share": share})
         self.drops = np.array([name in keys.drops for name in case.material])
         self.any_drops = bool(self.drops.any())  # local: materials

@@ -18,7 +18,7 @@ from cfddem.fluid.cut_cells import CutCells
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.near_walls_loops import shut
 from cfddem.fluid.solver import FluidSolver
-from cfddem.fluid.thin_walls import ASIDE, Divided
+from cfddem.fluid.thin_walls import ASIDE, TwoSided
 
 LEAST = 0.5
 """Share of a cell that must be open for a group of its own [-]."""
@@ -42,7 +42,7 @@ def large_cells(grid: Grid, open_share: Any) -> tuple[NDArray[np.bool_], NDArray
         raise InputError("walls", None, "such that some cells are at least half open", "take smaller cells")
     nearest = distance_transform_edt(small, sampling=grid.spacing[::-1], return_indices=True)[1]
     home = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
-    if isinstance(grid.walls, Divided):
+    if isinstance(grid.walls, TwoSided):
         home = _on_one_side(grid, small, np.flatnonzero(small & (open_share > 0.0)), home)
         small = small & (home != np.arange(home.size)).reshape(small.shape)
     return small, home
@@ -104,7 +104,7 @@ class CutGroups(SingleCells):
     def __init__(self, fluid: FluidSolver) -> None:
         grid, cut = fluid.grid, fluid.boundaries.cut
         assert isinstance(cut, CutCells)
-        if isinstance(grid.walls, Divided):
+        if isinstance(grid.walls, TwoSided):
             remedy = "leave out divided(), so that they are for particles only"
             raise InputError("thin walls", None, "left out beside a temperature or a vapour", remedy)
         if grid.whole is not grid:

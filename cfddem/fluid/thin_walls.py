@@ -55,7 +55,7 @@ class ThinWall:
 
 
 @dataclass(frozen=True, eq=False)
-class Divided:
+class TwoSided:
     """Fluid within a wall, divided by thin walls.
 
     wall  around the fluid; None in a box
@@ -96,7 +96,7 @@ def thin_wall(*surfaces: Array) -> ThinWall:
 
 def divided(thin: ThinWall, wall: Surface | None = None) -> Surface:
     """The fluid within a wall, or in a box, on both sides of thin walls."""
-    return Divided(wall, thin)
+    return TwoSided(wall, thin)
 
 
 def parted(surface: Surface, centres: list[Array], spacing: tuple[float, ...], d: int) -> NDArray[np.bool_]:
@@ -105,7 +105,7 @@ def parted(surface: Surface, centres: list[Array], spacing: tuple[float, ...], d
     centres  x, y, z of the cells, arrays of one shape [m]
     spacing  hx, hy, hz [m]
     """
-    if not isinstance(surface, Divided):
+    if not isinstance(surface, TwoSided):
         return np.zeros(centres[0].shape, bool)
     here = np.stack([np.ravel(each) for each in centres], axis=-1) + ASIDE * np.array(spacing)
     return surface.thin.between(here - np.eye(3)[d] * spacing[d], here).reshape(centres[0].shape)

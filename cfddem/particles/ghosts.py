@@ -53,7 +53,7 @@ ALONE = 2
 """Work for a particle over that for a pair of its list, by the bytes that a step moves for each: 296 and 177 (dry)."""
 
 
-class Whole:
+class SingleDomain:
     """The particles of a run in one process: it owns all of them.
 
     division  of space among the ranks, a new one after each cut; None in one process
@@ -90,7 +90,7 @@ class Whole:
         """Give ghosts the present values of the fields of a phase."""
 
 
-class Divided(Whole):
+class DividedDomain(SingleDomain):
     """The particles of one rank of several.
 
     division      of space
@@ -114,15 +114,15 @@ class Divided(Whole):
         self._near: list[int] | None = None  # ranks to which particles go between lists; all ranks if None
 
     def own(self, particles: Particles) -> Particles:
-        """See `Whole.own`."""
+        """See `SingleDomain.own`."""
         return particles.copy(self.owns(particles.position))
 
     def owns(self, position: np.ndarray) -> np.ndarray:
-        """See `Whole.owns`."""
+        """See `SingleDomain.owns`."""
         return self.division.owner(position) == self.communicator.rank
 
     def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None, cut: bool = False) -> np.ndarray:
-        """See `Whole.migrate`."""
+        """See `SingleDomain.migrate`."""
         particles.drop_ghosts()
         if self.balance and cut:
             self._cut_anew(particles, _work(old_row, edges))
@@ -152,7 +152,7 @@ class Divided(Whole):
         return old_row
 
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
-        """See `Whole.renew`."""
+        """See `SingleDomain.renew`."""
         self._near = self.division.near(self.communicator.rank, reach, box)
         found = self.division.rows_near(self._near, particles.position, reach, box)
         self._sent, self._received = {other: rows for other, rows in zip(self._near, found) if len(rows)}, {}
@@ -170,13 +170,13 @@ class Divided(Whole):
         return old_row
 
     def recall(self, edges: Edges) -> None:
-        """See `Whole.recall`."""
+        """See `SingleDomain.recall`."""
         for pairs in self._arrived:
             edges.recall(pairs, self._known(pairs["bodies"].reshape(-1)).reshape(-1, 2))
         self._arrived = []
 
     def refresh(self, phase: Phase) -> None:
-        """See `Whole.refresh`."""
+        """See `SingleDomain.refresh`."""
         arrays = [_as_words(self._particles[name]) for name in self._particles.halo_fields(phase)]
         width = sum(array.shape[1] for array in arrays)
         outgoing = {rank: np.empty(width * len(rows), np.int32) for rank, rows in self._sent.items()}
@@ -217,7 +217,7 @@ class Divided(Whole):
 
 
 def _work(old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
-    """Work for each particle by the pairs of its last list, in whole numbers; arguments as of `Whole.migrate`."""
+    """Work for each particle by the pairs of its last list, in whole numbers; arguments of `SingleDomain.migrate`."""
     work = np.full(len(old_row), ALONE, np.int64)
     if edges is not None and len(edges.start) > 1:
         work += np.where(old_row >= 0, np.diff(edges.start)[old_row], 0)
@@ -299,7 +299,9 @@ class StepsWithGhosts:
     communicator  of the run
     """
 
-    def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Whole, communicator: Communicator) -> None:
+    def __init__(
+        self, choices: Mapping[str, Any], threads: bool, ghosts: SingleDomain, communicator: Communicator
+    ) -> None:
         loops = (start_steps, start_step, move, find_bridge_changes, finish_step)
         self.begin, self.start, self.move, self.find_bridge_changes, self.finish = (
             specialise(loop, choices, threads) for loop in loops

@@ -12,7 +12,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import Divided, Whole
+from cfddem.particles.ghosts import DividedDomain, SingleDomain
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.neighbours import list_edges, locality_order, pair_reach, wrap
 from cfddem.particles.pair_graph import Edges
@@ -64,7 +64,7 @@ class NeighbourLists:
         self.pair_fields, self.table, self.box, self.communicator = pair_fields, table, box, communicator
         if communicator.size > 1 and division is None:
             raise InputError("division", None, "given in a run of several processes")
-        self.ghosts = Whole() if division is None else Divided(division, communicator, balance)
+        self.ghosts = SingleDomain() if division is None else DividedDomain(division, communicator, balance)
         self.skin, self.sort_every, self._is_tuned = skin or 0.0, sort_every, skin is None
         self.made, self.listed_at, self.many = -1, 0, False
         self._mean_radius = 0.0
@@ -132,7 +132,7 @@ class NeighbourLists:
             particles, walls, reach_ratio, self.skin, self.box, self.pair_fields, roughness, self.communicator
         )
         if old is not None:
-            fresh.remember(old, old_row)
+            fresh.carry_over(old, old_row)
         self.ghosts.recall(fresh)
         return fresh
 

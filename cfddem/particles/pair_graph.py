@@ -91,7 +91,7 @@ class Edges(Table):
         made.restore({name: each for name, each in kept.items() if name not in Graph._fields})
         return made
 
-    def remember(self, old: Edges, old_row: np.ndarray) -> None:
+    def carry_over(self, old: Edges, old_row: np.ndarray) -> None:
         """Take over what each pair remembers from an earlier list.
 
         old_row  (N,) int32, row that the particle of each new row had in the old list; -1 for new particles

@@ -121,7 +121,7 @@ class ParticleSolver:
             kept = CollisionRecord(dtype=collision_row(self.laws.bridges.collision_fields), communicator=communicator)
             self._rows_for = kept.room
             self.features.append(kept)
-        self.wall = Stopwatch()
+        self.timers = Stopwatch()
         self.lists = NeighbourLists(
             self.pair_fields, table, self.box, communicator=communicator, division=division, balance=balance,
             skin=skin, sort_every=sort_every,
@@ -232,7 +232,7 @@ class ParticleSolver:
         Raises UnstableStep if the step is above the stability limit of contacts, and RunFailed, with the particle, if
         a position is NaN, or a particle has left the domain or was pressed through another body.
         """
-        self.wall.start()
+        self.timers.start()
         if self.held:
             self.steps, self.time = self.steps + steps, self.time + steps * step
             return
@@ -247,12 +247,12 @@ class ParticleSolver:
                 each.before(self, step, first)
             done, farthest, noted = self._integrate(step, min(steps, at_once))
             self.last_step = step
-            self.wall.lap("pairs and motion")
+            self.timers.lap("pairs and motion")
             steps -= done
             for each in self.features:
                 each.after(self, step, steps == 0, noted)
                 if each.every_step:
-                    self.wall.lap(each.name)
+                    self.timers.lap(each.name)
             first = False
             self.steps += done
             self.time += done * step
@@ -262,7 +262,7 @@ class ParticleSolver:
                 guard(self.particles, self.edges, gap, self.domain, self.time, step, self.walls.wall, self.communicator)
             if moved_far:
                 self._relist()
-            self.wall.lap("neighbour lists")
+            self.timers.lap("neighbour lists")
 
     def hold(self) -> None:
         """Let the particles stay where they are from now on, with the forces between them; `advance` counts time."""

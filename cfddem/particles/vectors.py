@@ -87,6 +87,6 @@ def across(a, normal):
 
 
 @inline
-def either(condition, a, b):
+def select(condition, a, b):
     """a where the condition holds, else b; without a branch."""
     return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])

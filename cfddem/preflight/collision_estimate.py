@@ -30,7 +30,9 @@ class CollisionEstimate:
     real_overlap: float  # the same with the real modulus [m]
     resting_overlap: float  # under the weight of the bed [m]
     softening: float  # contact modulus over real modulus
-    film_rate: float  # of all species, largest resistance of a film over the reduced mass; 0 without films [1/s]
+    film_damping_rate: (
+        float  # of all species, largest resistance of a film over the reduced mass; 0 without films [1/s]
+    )
 
     @property
     def gap(self) -> float:
@@ -82,7 +84,7 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
         real_overlap=law.largest_overlap(mass, radius, hard, speed),
         resting_overlap=law.resting_overlap(mass, radius, row, load),
         softening=soft / real if law.takes("contact_modulus") else 1.0,
-        film_rate=max(_film_rate(case, each, viscosity) for each in case.species.values()) if films else 0.0,
+        film_damping_rate=max(_film_rate(case, each, viscosity) for each in case.species.values()) if films else 0.0,
     )
 
 

@@ -124,9 +124,9 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) 
         if collision.softening < 1.0:
             note = "if films used the contact modulus"
             yield Row(group, "minimum gap, softened", collision.softened_gap, "m", note)
-    if collision.film_rate > 0.0:
+    if collision.film_damping_rate > 0.0:
         note = "of the smallest particles at the smallest gap; films limit no step"
-        yield Row(group, "damping number X, largest", collision.film_rate * step, "", note)
+        yield Row(group, "damping number X, largest", collision.film_damping_rate * step, "", note)
     if case.laws.contact_law.takes("contact_modulus"):
         yield Row(group, "contact modulus / real", collision.softening)
     yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")

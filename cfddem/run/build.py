@@ -36,7 +36,7 @@ from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, 
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
-from cfddem.particles.ghosts import Whole, handed_out
+from cfddem.particles.ghosts import SingleDomain, handed_out
 from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
@@ -123,7 +123,7 @@ def flow_of(
     spheres: Particles,
     communicator: Communicator = SERIAL,
     cells: Division | None = None,
-    owners: Whole | None = None,
+    owners: SingleDomain | None = None,
 ) -> tuple[FluidSolver, Coupling]:
     """The fluid of a case around its particles, and their coupling.
 

@@ -139,7 +139,7 @@ class Run:
             else:
                 simulation = restored(case, state, Path(origin or ""), communicator, **added)
         wall.count("preparation")  # initial packing, loading of compiled loops
-        simulation.wall.seconds |= wall.seconds
+        simulation.timers.seconds |= wall.seconds
         grid = simulation.fluid.grid.whole if simulation.has_fluid else None
         about = (
             provenance(case.bed.seed)
@@ -190,7 +190,7 @@ class Run:
             else:
                 communicator.by_first(lambda: require_measures(written, case))
                 simulation = restored(case, state, folder, communicator, **added)
-                simulation.wall.seconds.update(written.about.get("wall_time", {}))
+                simulation.timers.seconds.update(written.about.get("wall_time", {}))
         warn_of_changes(written, case)
         written.drop_after(-1.0 if state is None else simulation.time)
         if until is not None:
@@ -322,13 +322,13 @@ class Run:
         self._write_snapshot()
 
     def _write_row(self) -> None:
-        with self.simulation.wall.part("measures"):
+        with self.simulation.timers.part("measures"):
             self.row = history.row(self.simulation)
             self.folder.append_history(self.row)
 
     def _write_snapshot(self) -> None:
         simulation, solver = self.simulation, self.simulation.particle_solver
-        with simulation.wall.part("snapshots"):
+        with simulation.timers.part("snapshots"):
             fluid: dict[str, np.ndarray | Portions] | None = None
             if simulation.has_fluid:
                 grid = simulation.fluid.grid
@@ -346,14 +346,14 @@ class Run:
     def _write_checkpoint(self) -> None:
         """Write the full state, with the intervals, which would otherwise follow from a new end."""
         begin, simulation = clock.monotonic(), self.simulation
-        with simulation.wall.part("checkpoints"):
+        with simulation.timers.part("checkpoints"):
             plan = {
                 "run.until": self.end, "run.every": self.every, "run.history_every": self.interval,
                 "run.until_error": simulation.case.run.until_error,
             }  # fmt: skip
             state: dict[str, Any] = {"time": simulation.time, "overrides": plan, "simulation": simulation.checkpoint()}
             self.folder.write_checkpoint(state)
-        self.folder.note("wall_time", dict(simulation.wall.seconds))
+        self.folder.note("wall_time", dict(simulation.timers.seconds))
         self._checkpoint_at = clock.monotonic()
         self._checkpoint_cost = self._checkpoint_at - begin
 

@@ -110,7 +110,7 @@ class Simulation:
         self._case, self.particle_solver, self._coupling = case, *parts
         self._around = self._coupling or Uncoupled(self.particle_solver)
         self._fluid, self.forces, self.gravity = self._around.fluid, self._around.forces, self._around.gravity
-        self.communicator, self.wall = self.particle_solver.communicator, self.particle_solver.wall
+        self.communicator, self.timers = self.particle_solver.communicator, self.particle_solver.timers
         kinds = [] if case is None else [each for each in FEATURES if each.is_in(case)]
         if case is not None:
             fields = [*fields, *(field for each in kinds for field in each.fields_of(case))]
@@ -230,7 +230,7 @@ class Simulation:
 
     def step(self, until: float = math.inf) -> None:
         """Make one fluid step and the particle steps within it; some step ends exactly at `until` [s]."""
-        part = self.wall.part
+        part = self.timers.part
         with part("time steps"):
             step, substeps = self.time_steps.choose(until, self.steps)
         self.terms = self._around.advance(self.owned, step, self.last_step, part)

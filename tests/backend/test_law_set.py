@@ -14,7 +14,15 @@ from numba import njit as serial_without_cache
 
 from cfddem.backend.compile import either, inline, prange
 from cfddem.backend.errors import InputError
-from cfddem.backend.law_set import Slot, adapted, callable_in_loops, check_compiles, fingerprint, specialise, written
+from cfddem.backend.law_set import (
+    Slot,
+    bind_arguments,
+    callable_in_loops,
+    check_compiles,
+    compile_source,
+    fingerprint,
+    specialise,
+)
 from cfddem.backend.named import named_arrays
 
 scale = Slot("scale")
@@ -74,11 +82,11 @@ def test_the_fingerprint_follows_everything_a_law_refers_to(monkeypatch: pytest.
 
 
 def test_arguments_are_found_by_name() -> None:
-    law = adapted(lambda b, a: a - 2.0 * b, "pair", {"a": "pair[0]", "b": "pair[1]"})
+    law = bind_arguments(lambda b, a: a - 2.0 * b, "pair", {"a": "pair[0]", "b": "pair[1]"})
     called = serial_without_cache(lambda pair: law(pair))  # helpers have no entry from Python
     assert called((5.0, 1.0)) == 3.0
     with pytest.raises(InputError, match=r"argument of .* = 'c': must be one of a"):
-        adapted(lambda c: c, "pair", {"a": "pair[0]"})
+        bind_arguments(lambda c: c, "pair", {"a": "pair[0]"})
 
 
 def test_a_law_that_cannot_be_compiled_is_refused() -> None:
@@ -96,7 +104,7 @@ def test_copies_of_functions_made_from_text_differ_by_their_text() -> None:
     results = []
     for text in texts:
         values = np.array([1.0])
-        choices = {"scale": written(text, inner=inner), "inner": callable_in_loops(triple), "TWICE": False}
+        choices = {"scale": compile_source(text, inner=inner), "inner": callable_in_loops(triple), "TWICE": False}
         specialise(fill, choices)(values)
         results.append(values[0])
     assert results == [4.0, 5.0]

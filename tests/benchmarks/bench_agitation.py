@@ -70,7 +70,7 @@ def main() -> None:
     for run in runs.values():
         for _ in range(5):
             run.step()
-    parts = {law: run.wall.seconds.copy() for law, run in runs.items()}
+    parts = {law: run.timers.seconds.copy() for law, run in runs.items()}
     for _ in range(given.rounds):
         for law, run in runs.items():
             begin, reached = time.process_time(), run.time
@@ -81,7 +81,7 @@ def main() -> None:
     print(f"{given.count} beads: {without:.1f} s per simulated second without agitation, {with_it:.1f} with it")
     print(f"ratio {with_it / without:.3f}")
     part, steps = "voidage and drag", 5 * given.rounds
-    spent = [(run.wall.seconds[part] - parts[law].get(part, 0.0)) / steps for law, run in runs.items()]
+    spent = [(run.timers.seconds[part] - parts[law].get(part, 0.0)) / steps for law, run in runs.items()]
     whole = without * runs["none"].last_step
     print(f"the closure itself: {100.0 * (spent[1] - spent[0]) / whole:.1f} % of a step without agitation")
 

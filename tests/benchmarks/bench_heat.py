@@ -83,7 +83,7 @@ def measure(bed: str, steps: int) -> list[Simulation]:
     for name, one, other in (("heat", 0, 1), ("vapour and evaporation", 2, 3)):
         added = statistics.median(each[other] / each[one] for each in spent) - 1.0
         print(f"  {name:24} adds {100.0 * added:5.1f} %  (limit {100.0 * LIMIT:.0f} %)", flush=True)
-    parts = drying.wall.seconds
+    parts = drying.timers.seconds
     shares = ", ".join(f"{name} {1e3 * value / drying.steps:.3f}" for name, value in parts.items())
     print(f"  of the last, ms per step: {shares}")
     return simulations

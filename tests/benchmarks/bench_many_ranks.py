@@ -26,7 +26,7 @@ from cfddem.backend.brick_shapes import Shape, place_of
 from cfddem.backend.compile import use_threads
 from cfddem.backend.mpi import Ranks
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import Divided, packed, unpacked
+from cfddem.particles.ghosts import DividedDomain, packed, unpacked
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
@@ -135,7 +135,7 @@ def main(count: int) -> None:
         print(f"  {name:<14}{1e6 * seconds:8.1f} us{word}")
     a_side, first = round(count ** (1.0 / 3.0)), 0.0
     use_threads(1)
-    patched: Any = Divided
+    patched: Any = DividedDomain
     patched.refresh = lambda self, phase: None  # what ghosts receive in steps is not recorded
     _, record, *_ = lists((3, 3, 3), a_side)
     for shape in SHAPES:

@@ -41,7 +41,7 @@ def main(beads: int, steps: int) -> None:
         seconds = time.process_time()
         run.go()
         seconds = ranks.largest([time.process_time() - seconds])
-        parts = run.simulation.particle_solver.wall.seconds
+        parts = run.simulation.particle_solver.timers.seconds
         loops = ranks.largest([sum(parts.get(name, 0.0) for name in ("pairs and motion", "neighbour lists"))])
         memory = 1e-6 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         memories = ranks.joined(np.array([memory]))

@@ -48,7 +48,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         run = Run.begin(case(arguments.count, short), Path(folder, "run"))
         run.go()
-        seconds = dict(run.simulation.wall.seconds)
+        seconds = dict(run.simulation.timers.seconds)
     writing = sum(seconds.get(name, 0.0) for name in WRITINGS)
     stepping = sum(each for name, each in seconds.items() if name not in (*WRITINGS, "first calls"))
     between = stepping / short * arguments.until / 50.0

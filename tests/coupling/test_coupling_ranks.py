@@ -20,8 +20,8 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
 from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
+from cfddem.coupling.ghost_deposit import GhostDeposit
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.reach import Reach
 from cfddem.features.heat import HeatExchange
 from cfddem.fluid.block import Block, Division, divide, region_of
 from cfddem.fluid.grid import Array, Grid
@@ -29,7 +29,7 @@ from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.multigrid import PressureEquation
 from cfddem.io import checkpoint
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import Divided, Whole
+from cfddem.particles.ghosts import DividedDomain, SingleDomain
 from cfddem.particles.state import Particles
 from cfddem.run import history
 from cfddem.run.resuming import LARGE
@@ -245,13 +245,13 @@ def test_bricks_follow_a_bed_that_leaves_one_side(monkeypatch: pytest.MonkeyPatc
 
     The division of the cells stays: what particles deposit travels to other ranks.
     """
-    shape, cuts, plain = (2, 2, 1), dict[int, list[float]](), Divided._cut_anew
+    shape, cuts, plain = (2, 2, 1), dict[int, list[float]](), DividedDomain._cut_anew
     case = case_of(
         BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", run__energy_budget=True,
         bed__initial_velocity=[0.8, 0.5, -0.1], **ALL_FORCES
     )  # fmt: skip
 
-    def cut(self: Divided, particles: Particles, work: Array) -> None:
+    def cut(self: DividedDomain, particles: Particles, work: Array) -> None:
         before = self.division
         plain(self, particles, work)
         if self.division is not before:
@@ -259,7 +259,7 @@ def test_bricks_follow_a_bed_that_leaves_one_side(monkeypatch: pytest.MonkeyPatc
             shares = self.communicator.sum(shares, axis=())
             cuts.setdefault(self.communicator.rank, []).append(shares.max() / shares.mean())
 
-    monkeypatch.setattr(Divided, "_cut_anew", cut)
+    monkeypatch.setattr(DividedDomain, "_cut_anew", cut)
 
     def program(communicator: Communicator) -> dict[str, Array]:
         communicator.shape = shape
@@ -284,7 +284,7 @@ def test_fields_travel_between_the_division_of_cells_and_that_of_particles(
 
     def program(communicator: Communicator) -> None:
         block = Block(grid, divide(grid, ranks, shape=shape), communicator)
-        reach = Reach(block, periodic, division=division)
+        reach = GhostDeposit(block, periodic, division=division)
         first, lengths = reach.axes().first, reach.shape
         at = np.ix_(range(2), *((first[2 - d] + np.arange(lengths[d])) % grid.shape[d] for d in range(3)))
         assert np.array_equal(reach.spread(block.part(whole)), whole[at])
@@ -305,10 +305,13 @@ def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[boo
     uneven = draw.uniform(1.0, 2.0, grid.shape)
 
     def program(communicator: Communicator) -> list[Array]:
-        cells, owners, mine = grid, Whole(), np.arange(2000)
+        cells, owners, mine = grid, SingleDomain(), np.arange(2000)
         if communicator.size > 1:
             cells = Block(grid, divide(grid, 8, shape=shape), communicator)
-            owners, mine = Divided(division, communicator), np.flatnonzero(division.owner(places) == communicator.rank)
+            owners, mine = (
+                DividedDomain(division, communicator),
+                np.flatnonzero(division.owner(places) == communicator.rank),
+            )
         kernel = FilterKernel(cells, periodic, owners=owners)
         found = [kernel.between_centres(cells.part(each), places[mine]) for each in (layered, uneven)]
         order = np.argsort(communicator.joined(mine))
@@ -323,12 +326,12 @@ def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[boo
 def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
     """The volume that one rank deposits on cells of another belongs to the bed."""
 
-    def own(self: Reach, fields: Array) -> Array:
+    def own(self: GhostDeposit, fields: Array) -> Array:
         rank, made = self._communicator.rank, np.zeros((len(fields), *self.grid.shape), np.int64)
         made[self._in_cells[rank][0]] = fields[self._in_box[rank][0]]
         return made
 
-    monkeypatch.setattr(Reach, "collected", own)
+    monkeypatch.setattr(GhostDeposit, "collected", own)
     case = BEDS["all forces"]
     imbalance = on_ranks(2, lambda communicator: advanced(begun(case, communicator), 0)["imbalance"])[0]
     assert abs(imbalance[2]) > 1e-3
@@ -437,7 +440,7 @@ def test_a_particle_beyond_the_ghosts_is_reported() -> None:
     grid = Grid((12, 2, 2), (0.1, 0.1, 0.1))
 
     def program(communicator: Communicator) -> None:
-        reach = Reach(Block(grid, Division(((0, 6, 12), (0, 2), (0, 2))), communicator), (False, False, False))
+        reach = GhostDeposit(Block(grid, Division(((0, 6, 12), (0, 2), (0, 2))), communicator), (False, False, False))
         reach.refuse_beyond(np.array([[0.6 + 0.24 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
         with pytest.raises(RunFailed, match=r"2\.6 cells beyond"):
             reach.refuse_beyond(np.array([[0.6 + 0.26 * (1 - 2 * communicator.rank), 0.1, 0.1]]))

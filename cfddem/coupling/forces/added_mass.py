@@ -33,7 +33,7 @@ import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
-from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import CouplingTerms
@@ -79,7 +79,7 @@ class AddedMass(FluidForce):
         self._varies = isinstance(given, Law)
         self._deferred = np.zeros((0, 3))
         if isinstance(given, Law):
-            law = adapted(given.function, "voidage", {"voidage": "voidage"})
+            law = bind_arguments(given.function, "voidage", {"voidage": "voidage"})
             self._fill = specialise(_coefficients, {"coefficient": law})
         else:
             self._fill = lambda voidage, values: values.fill(float(given))

@@ -30,7 +30,7 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.counter_random import normal_numbers
-from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
@@ -171,7 +171,9 @@ class PseudoTurbulence(Agitation):
         self.factors, self.pushes = factors, factors.inertia > 0.0
         self.fields = (PROCESS, FLUCTUATION) if self.pushes else (PROCESS,)
         self.added_mass = added_mass
-        called = adapted(law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS})
+        called = bind_arguments(
+            law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS}
+        )
         self._loop = specialise(_fluctuate, {"variance": called})
         self._ranges = np.array([law.ranges.get(name, (-math.inf, math.inf)) for name in AGITATION_ARGUMENTS])
 

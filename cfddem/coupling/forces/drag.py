@@ -25,7 +25,7 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
 from cfddem.backend.errors import InputError
-from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import ForceTerms
@@ -61,7 +61,7 @@ class Drag(FluidForce):
         self.fields = (OWED,) if self.sharp else ()
         self._alone = np.zeros(0)  # conductance of the drag law alone
         self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
-        factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
+        factor = bind_arguments(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
         self._loop = specialise(_conductances, {"drag_factor": factor})
         self._ranges = tuple(law.ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
 

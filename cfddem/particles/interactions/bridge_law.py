@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.backend.law_set import adapted, check_compiles
+from cfddem.backend.law_set import bind_arguments, check_compiles
 from cfddem.backend.named import can_be_named
 from cfddem.data.fields import Field
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS, WET_FIELDS
@@ -336,11 +336,11 @@ class BridgeLaws:
         }
         for slot, function in self._functions().items():
             if slot == "drawn_share":
-                made[slot] = adapted(function, "radius, other_radius", of_radii)
+                made[slot] = bind_arguments(function, "radius, other_radius", of_radii)
             elif slot == "returned_share":
-                made[slot] = adapted(function, ", ".join(of_radii | of_angles), of_radii | of_angles)
+                made[slot] = bind_arguments(function, ", ".join(of_radii | of_angles), of_radii | of_angles)
             else:
-                made[slot] = adapted(function, "bridge", of_bridge)
+                made[slot] = bind_arguments(function, "bridge", of_bridge)
         return made | {
             "BRIDGE_FILM": "bridge_resistance" in made,
             "BRIDGE_INERTIA": self.film_density > 0.0,

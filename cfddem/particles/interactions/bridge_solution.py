@@ -94,20 +94,20 @@ def cut_resistance(state, gap, floor):
 
 
 @inline
-def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
+def speed_after_bridge(speed, state, integrated_gap, step, inverse_mass):
     """Rate of the gap after a step in which only the bridge acts.
 
     Solves u1 + I(h, h + u1 dt) / m = u0 + I(h, ha) / m by Newton's method, kept between 0 and the speed without
     resistance; I is the integral of the resistance. It ends where the equation holds to round-off, as computed or by a
     bound on what the last change leaves, for resistances that rise or fall all the way between two guesses.
 
-    accounted_gap  ha, gap up to which the impulse has been given [m]
+    integrated_gap  ha, gap up to which the impulse has been given [m]
     inverse_mass   1/m of the mass that the pair gives this bridge [1/kg]
     """
     gap, floor = state.gap, held_gap(state)
     total = speed
-    if accounted_gap != gap:
-        total += inverse_mass * resistance_integral(state, gap, accounted_gap - gap, floor)
+    if integrated_gap != gap:
+        total += inverse_mass * resistance_integral(state, gap, integrated_gap - gap, floor)
     guess = total / (1.0 + step * inverse_mass * cut_resistance(state, gap, floor))
     if abs(step * guess) < STILL * max(gap, floor) and (gap > floor) == (gap + step * guess > floor):
         return guess

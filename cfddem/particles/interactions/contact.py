@@ -23,7 +23,7 @@ from cfddem.particles.interactions.slots import (
     remember,
     tangential_stiffness,
 )
-from cfddem.particles.vectors import LEAST, NOTHING, across, cross, dot, either, minus, plus, times
+from cfddem.particles.vectors import LEAST, NOTHING, across, cross, dot, minus, plus, select, times
 from closures.blend import contact_share
 from closures.friction import coulomb_limit, dry_or_lubricated
 
@@ -117,16 +117,16 @@ def contact(kinematics, row, minimum_gap, spring, m, p, step):
     pull = times(limit / max(size, LEAST) if sliding else 1.0, pull)
     # a sliding spring carries what the dashpot leaves of Coulomb's limit, and never more than the limit
     carried = minus(pull, times(damping, slip))
-    carried = either(dot(carried, carried) > limit * limit, pull, carried)
-    spring = either(sliding, times(1.0 / max(stiffness, LEAST), carried), spring)
+    carried = select(dot(carried, carried) > limit * limit, pull, carried)
+    spring = select(sliding, times(1.0 / max(stiffness, LEAST), carried), spring)
 
     gripping = touching and (not FROM_OVERLAP or kinematics.gap < 0.0)
-    pull = either(gripping, pull, NOTHING)
+    pull = select(gripping, pull, NOTHING)
     force = minus(times(normal_force, normal), pull)
     return (
-        either(touching, times(share, force), NOTHING),
+        select(touching, times(share, force), NOTHING),
         times(share * stretch, cross(normal, pull)),
-        either(gripping, spring, NOTHING),
+        select(gripping, spring, NOTHING),
         m,
         d,
     )

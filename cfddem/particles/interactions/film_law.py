@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.compile import inline
-from cfddem.backend.law_set import adapted, check_compiles, written
+from cfddem.backend.law_set import bind_arguments, check_compiles, compile_source
 from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     POTENTIAL,
@@ -73,13 +73,13 @@ class FilmLaw:
             name: law for name in ("potential", "short_potential") if (law := getattr(self, name)) is not None
         }
         of_sliding = [*SLIDING_ARGUMENTS]
-        sliding = {} if self.sliding is None else {"film_sliding": adapted(
+        sliding = {} if self.sliding is None else {"film_sliding": bind_arguments(
             self.sliding, ", ".join(["scale", *of_sliding]), dict(zip(of_sliding, of_sliding)), "scale * {}"
         )}  # fmt: skip
         return {
             **sliding,
-            "user_resistance": adapted(self.resistance, "film", sources),
-            **{f"user_{name}": adapted(law, "gap, end_gap, film", ends) for name, law in potentials.items()},
+            "user_resistance": bind_arguments(self.resistance, "film", sources),
+            **{f"user_{name}": bind_arguments(law, "gap, end_gap, film", ends) for name, law in potentials.items()},
             "POTENTIAL": self.potential is not None,
             "SHORT_POTENTIAL": self.short_potential is not None,
             "film_resistance": resistance_at_least,
@@ -111,16 +111,16 @@ def _nijssen_explicit_resistance(film):
 
 
 @inline
-def _nijssen_short_step(speed, film, accounted_gap, step, strength_per_mass, inverse_mass):
+def _nijssen_short_step(speed, film, integrated_gap, step, strength_per_mass, inverse_mass):
     return lubrication.speed_after_short_step(
-        speed, film.gap, accounted_gap, step, strength_per_mass, film.minimum_gap, film.cutoff_gap
+        speed, film.gap, integrated_gap, step, strength_per_mass, film.minimum_gap, film.cutoff_gap
     )
 
 
 @inline
-def _nijssen_step(speed, film, accounted_gap, step, strength_per_mass, inverse_mass):
+def _nijssen_step(speed, film, integrated_gap, step, strength_per_mass, inverse_mass):
     return lubrication.speed_after_film(
-        speed, film.gap, accounted_gap, step, strength_per_mass, film.minimum_gap, film.cutoff_gap
+        speed, film.gap, integrated_gap, step, strength_per_mass, film.minimum_gap, film.cutoff_gap
     )
 
 
@@ -128,12 +128,12 @@ def range_check(kind: str, fields: tuple[str, ...], ranges: Mapping[str, tuple[f
     """A function of a state that returns 1 where an argument of a law lies outside of its range, else 0."""
     tests = [f"not ({low!r} <= {kind}.{name} <= {high!r})" for name, (low, high) in ranges.items() if name in fields]
     text = " or ".join(tests).replace("-inf", "-INF").replace("inf", "INF") or "False"
-    return written(f"def outside({kind}):\n    return 1 if {text} else 0\n", INF=math.inf)
+    return compile_source(f"def outside({kind}):\n    return 1 if {text} else 0\n", INF=math.inf)
 
 
 def gap_choices(law: Callable[..., float]) -> dict[str, Any]:
     """What goes into the slots of the loops for a user's law of the minimum gap."""
-    return {"user_minimum_gap": adapted(law, "gap", {name: f"gap.{name}" for name in GapState._fields})}
+    return {"user_minimum_gap": bind_arguments(law, "gap", {name: f"gap.{name}" for name in GapState._fields})}
 
 
 # ---------------------------------------------------------------- integrator
@@ -182,7 +182,7 @@ def _short_integral(gap, end, film, least):
 
 
 @inline
-def speed_after_short_step(speed, film, accounted_gap, step, strength_per_mass, inverse_mass):
+def speed_after_short_step(speed, film, integrated_gap, step, strength_per_mass, inverse_mass):
     """Rate of the gap after a step in which only the film acts, where the gap hardly changes; else NaN.
 
     Solves u1 + I(h, h + u1 dt) / m = u0 + I(h, ha) / m by two steps of Newton, I being the integral of the resistance.
@@ -195,7 +195,7 @@ def speed_after_short_step(speed, film, accounted_gap, step, strength_per_mass, 
     resistance = user_resistance(at_gap(film, max(gap, minimum_gap)))
     weight = step * inverse_mass
     lever = 1.0 / minimum_gap
-    total = speed + inverse_mass * _short_integral(gap, accounted_gap, film, resistance)
+    total = speed + inverse_mass * _short_integral(gap, integrated_gap, film, resistance)
     guess = total / (1.0 + weight * resistance * (1.0 if inside else lever * max(gap, 0.0)))
     last = guess
     for _ in range(2):
@@ -205,7 +205,7 @@ def speed_after_short_step(speed, film, accounted_gap, step, strength_per_mass, 
         last = excess / (1.0 + weight * slope)
         guess -= last
     end = gap + step * guess
-    low, high = min(gap, end, accounted_gap), max(gap, end, accounted_gap)
+    low, high = min(gap, end, integrated_gap), max(gap, end, integrated_gap)
     change = LARGEST_CHANGE if SHORT_POTENTIAL else LARGEST_SAMPLED_CHANGE
     shortly = (low > minimum_gap and high < film.cutoff_gap and high - low <= change * low) if inside else (
         high <= minimum_gap
@@ -247,10 +247,10 @@ def _integral(gap, end, film):
 
 
 @inline
-def speed_after_step(speed, film, accounted_gap, step, strength_per_mass, inverse_mass):
+def speed_after_step(speed, film, integrated_gap, step, strength_per_mass, inverse_mass):
     """The same rate for any change of the gap: Newton's method, kept between 0 and the speed without resistance."""
     gap = film.gap
-    total = speed + inverse_mass * _integral(gap, accounted_gap, film)
+    total = speed + inverse_mass * _integral(gap, integrated_gap, film)
     low, high = min(total, 0.0), max(total, 0.0)
     guess = total / (1.0 + step * inverse_mass * resistance_with_lever(film))
     if abs(step * guess) < 1e-7 * gap:

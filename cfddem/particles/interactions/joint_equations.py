@@ -42,7 +42,7 @@ from cfddem.particles.interactions.slots import (
     speed_after_short_film,
 )
 from cfddem.particles.pair_graph import edge_role, geometry
-from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, select, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 
 SLIGHT = 1e-3
@@ -250,7 +250,7 @@ def spread(system, direction):
                 push, roll = slip_and_roll_of(shear_impulse, e)
                 first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
                 total = plus(total, times(sign, push))
-                couple = plus(couple, either(sign > 0.0, first, second))
+                couple = plus(couple, select(sign > 0.0, first, second))
         put(change, i, times(particles.inverse_mass[i], total))
         if SLIDES:
             put(turn, i, times(particles.inverse_inertia[i], couple))

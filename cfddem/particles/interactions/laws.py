@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
-from cfddem.backend.law_set import adapted, check_compiles, written
+from cfddem.backend.law_set import bind_arguments, check_compiles, compile_source
 from cfddem.backend.named import NAMES, can_be_named
 from cfddem.data.fields import Field
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
@@ -279,20 +279,20 @@ def contact_choices(law: ContactLaw) -> dict[str, Any]:
         "lost_energy": law.lost or _nothing,
     }
     places = _places(law)
-    made = {slot: adapted(function, ARGUMENTS, places) for slot, function in functions.items()}
+    made = {slot: bind_arguments(function, ARGUMENTS, places) for slot, function in functions.items()}
     sources = {name: place for name, place in places.items() if name not in law.derived}
-    parts = {f"law_{n}": adapted(each, ARGUMENTS[:-3], sources) for n, each in enumerate(law.derived.values())}
+    parts = {f"law_{n}": bind_arguments(each, ARGUMENTS[:-3], sources) for n, each in enumerate(law.derived.values())}
     calls = "".join(f"{name}({ARGUMENTS[:-3]}), " for name in parts)
-    made["derive"] = written(f"def derive({ARGUMENTS[:-3]}):\n    return ({calls})\n", **parts)
+    made["derive"] = compile_source(f"def derive({ARGUMENTS[:-3]}):\n    return ({calls})\n", **parts)
     if law.remember is None:
-        made["remember"] = written(f"def remember({ARGUMENTS}):\n    return m\n")
+        made["remember"] = compile_source(f"def remember({ARGUMENTS}):\n    return m\n")
     else:
-        made["remember"] = adapted(law.remember, ARGUMENTS, places, "({},)" if len(law.memory) == 1 else "{}")
+        made["remember"] = bind_arguments(law.remember, ARGUMENTS, places, "({},)" if len(law.memory) == 1 else "{}")
     names = [each.name for each in law.memory]
-    made["read_memory"] = written(
+    made["read_memory"] = compile_source(
         f"def read_memory(memory, k):\n    return ({''.join(f'memory.{name}[k], ' for name in names)})\n"
     )
-    made["write_memory"] = written(
+    made["write_memory"] = compile_source(
         "def write_memory(memory, k, m, touching):\n"
         + "".join(f"    memory.{each.name}[k] = m[{n}] if touching else {float(each.initial)!r}\n"  # type: ignore[arg-type]
                   for n, each in enumerate(law.memory))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.backend.compile import inline, kept_whole, prange, vector_part
-from cfddem.backend.law_set import specialise, written
+from cfddem.backend.law_set import compile_source, specialise
 from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, thinnest_film
@@ -203,7 +203,9 @@ def loop_choices(
               if each.role == "memory" and each.name not in kept_apart]  # fmt: skip
     return {
         **loops,
-        "copy_memory": written("def copy_memory(memory, k, to):\n    " + "\n    ".join(copied) + "\n", put=put, at=at),
+        "copy_memory": compile_source(
+            "def copy_memory(memory, k, to):\n    " + "\n    ".join(copied) + "\n", put=put, at=at
+        ),
         "clear_contact": specialise(_clear_contact, choices),
     }
 
@@ -247,8 +249,8 @@ def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Pa
         f"    kinds, rows = uint64(len(system.table)), system.table.reshape(-1)\n"
         f"    over_pairs(begin, end, {given}{more})\n"
     )
-    made_loop = written(loop, vector_part, body=body, prange=prange, kept_whole=kept_whole, **structures)
-    return written(call, over_pairs=made_loop, uint64=np.uint64)
+    made_loop = compile_source(loop, vector_part, body=body, prange=prange, kept_whole=kept_whole, **structures)
+    return compile_source(call, over_pairs=made_loop, uint64=np.uint64)
 
 
 def _places(value: Any, place: str) -> list[str]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.slots import FILM, rolling_torque, secant_stiffness
-from cfddem.particles.vectors import LEAST, NOTHING, across, dot, either, plus, times
+from cfddem.particles.vectors import LEAST, NOTHING, across, dot, plus, select, times
 from closures.blend import contact_share
 from closures.friction import (
     dry_or_lubricated,
@@ -65,7 +65,7 @@ def resist_rolling(kinematics, contact, row, force, roll, p, m, d):
     rolling = RollingState(normal, rate, limit, stiffness, softly, kinematics.inverse_inertia)
     moment, roll = rolling_torque(rolling, roll, contact.step, p)
     moment = plus(moment, times(twisting, normal))
-    return either(touching, moment, NOTHING), either(touching, roll, NOTHING)
+    return select(touching, moment, NOTHING), select(touching, roll, NOTHING)
 
 
 @inline

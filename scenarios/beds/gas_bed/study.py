@@ -87,13 +87,13 @@ def _measure(fluid_step: float, measured: float) -> dict[str, Any]:
     simulation = Simulation(standard_bed(fluid_step))
     for _ in range(3):
         simulation.step()
-    before = dict(simulation.wall.seconds)
+    before = dict(simulation.timers.seconds)
     begin, wall, processor = simulation.time, perf_counter(), process_time()
     while simulation.time < begin + measured * (1.0 - 1e-9):
         simulation.step()
     wall, processor = perf_counter() - wall, process_time() - processor
     time = simulation.time - begin
-    parts = {name: seconds - before.get(name, 0.0) for name, seconds in simulation.wall.seconds.items()}
+    parts = {name: seconds - before.get(name, 0.0) for name, seconds in simulation.timers.seconds.items()}
     return {
         "fluid step [s]": fluid_step,
         "wall [s/s]": wall / time,

@@ -94,7 +94,7 @@ def bench(threads: int = 1, measured: tuple[float, float, float] = MEASURED) -> 
     beds = {name: Simulation(bed(name).with_(**{"run.particle_step": 1.2e-5})) for name in ("dry", "oil 0.1 %")}
     for each in beds.values():
         each.until(begin)
-    before = {name: dict(each.wall.seconds) for name, each in beds.items()}
+    before = {name: dict(each.timers.seconds) for name, each in beds.items()}
     spent = dict.fromkeys(beds, 0.0)
     for time in np.arange(begin + piece, end + 0.5 * piece, piece):
         for name, each in beds.items():
@@ -109,7 +109,7 @@ def bench(threads: int = 1, measured: tuple[float, float, float] = MEASURED) -> 
 def _cost(run: Simulation, before: dict[str, float], spent: float, time: float) -> dict[str, Any]:
     """What a bed has cost; `spent` processor time over a simulated time [s]."""
     solver = run.particle_solver
-    parts = {name: seconds - before.get(name, 0.0) for name, seconds in run.wall.seconds.items()}
+    parts = {name: seconds - before.get(name, 0.0) for name, seconds in run.timers.seconds.items()}
     return {
         "processor [s/s]": spent / time,
         "shares": {part: seconds / sum(parts.values()) for part, seconds in parts.items() if seconds > 0.0},

@@ -38,7 +38,7 @@ Overlaps = dict[int, list[Region]]
 """By rank, the regions that it shares."""
 
 
-class Homes(NamedTuple):
+class GhostOwners(NamedTuple):
     """Cells that receive what is deposited on the cells and on a layer around them; flat indices.
 
     A cell receives its own, those of solid cells to which it is the nearest open one, and those of ghosts that take its
@@ -50,7 +50,7 @@ class Homes(NamedTuple):
     begins: np.ndarray  # (cells + 1,) first place of each home in `order`
 
 
-class Reach:
+class GhostDeposit:
     """The cells that the particles of a rank reach.
 
     grid      cells of the rank
@@ -96,13 +96,13 @@ class Reach:
         self._in_box = _overlaps(self._box, cells, shifts)
         self._in_cells = _overlaps(cells[:, rank], boxes, [-each for each in shifts])  # in the same order
 
-    def homes(self) -> Homes:
+    def homes(self) -> GhostOwners:
         """Homes of the cells and of the layer around them."""
         homes = self._home_of_each()
         layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
         own = layered[1:-1, 1:-1, 1:-1].ravel()
         order = np.argsort(homes, kind="stable")
-        return Homes(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
+        return GhostOwners(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
 
     def _home_of_each(self) -> np.ndarray:
         """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""
