@@ -246,7 +246,7 @@ def test_the_status_of_the_check_sets_the_exit_code(tmp_path: Path, monkeypatch:
     assert parsed(call("check", "liquid-bed", *high, "--json").out)["status"] == "error"
     shared, refused = (call("check", "liquid-bed", "--ranks", ranks) for ranks in ("2", "40"))
     assert shared.code == 0 and "can share the case, about 800 particles each" in shared.out
-    assert "1 x 1 x 2 bricks, the least of all shapes" in shared.out
+    assert "1 x 1 x 2 bricks, the least work" in shared.out
     given = call("check", "liquid-bed", "--set", "column.width=0.06", "--division", "2x2x2")
     assert "2 x 2 x 2 bricks, as given" in given.out
     assert "ranks along x, y and z, such as 2x2x1" in call("check", "liquid-bed", "--division", "2x2").err
