@@ -1,4 +1,4 @@
-"""The page of the map of films from its data: its numbers and its figure.
+"""The page of the map of films from its data: its numbers, its figure, and its row in the list of cases.
 
 `python docs/tools/film_map.py RESULTS` takes the finished beds of `cfddem validate film-map -o RESULTS`, runs none, and
 stores data, table and figure in docs. Without a folder it writes the page from the stored data.
@@ -32,6 +32,7 @@ from scenarios.validation.film_map.design import (  # noqa: E402
 )
 from scenarios.validation.film_map.effects import Beds, Estimate  # noqa: E402
 
+LIST = ROOT / "scenarios" / "README.md"
 DATA = ROOT / "docs" / "tables" / "film-map.csv"
 PAGE = ROOT / "scenarios" / "validation" / "film_map" / "README.md"
 BEGIN, END = "<!-- from the data: begin -->", "<!-- from the data: end -->"
@@ -63,8 +64,12 @@ def store(results: Path) -> None:
 
 
 def write() -> None:
-    """Write the page from the stored data."""
-    PAGE.write_text(page_of(stored()), encoding="utf-8")
+    """Write the page and its row in the list of cases from the stored data."""
+    beds = stored()
+    PAGE.write_text(page_of(beds), encoding="utf-8")
+    row = r"(\(validation/film_map/README\.md\) \| [^|]+ \| )[^|]+( \|)"
+    listed = re.sub(row, lambda found: f"{found[1]}{headline(beds)}{found[2]}", LIST.read_text(encoding="utf-8"))
+    LIST.write_text(listed, encoding="utf-8")
 
 
 def stored() -> Beds:
