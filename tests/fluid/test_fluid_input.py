@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, ramp, rectangle
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
@@ -109,7 +110,9 @@ def test_solid_cells_take_the_viscosity_of_the_fluid_beside_them():
     grid = Grid.of_size((0.8, 0.8, 0.2), 0.1, solid=outside_cylinder((0.4, 0.4, 0.0), 0.4))
     field = np.where(grid.open, 2.0 + 0.0 * grid.centres()[2], np.nan)
     fluid = FluidSolver(grid, density=1.0, viscosity=field)
-    assert fluid.viscosity_at(np.array([[0.4, 0.4, 0.1], [0.4, 0.79, 0.1], [0.14, 0.14, 0.1]])).tolist() == [2.0] * 3
+    places = np.array([[0.4, 0.4, 0.1], [0.4, 0.79, 0.1], [0.14, 0.14, 0.1]])
+    kernel = FilterKernel(grid, (False, False, False))
+    assert kernel.between_centres(fluid.viscosity, places).tolist() == [2.0] * 3
     with pytest.raises(InputError, match="positive everywhere, or zero everywhere"):
         fluid.set_viscosity(np.where(grid.centres()[2] < 0.1, 1.0, 0.0) + 0.0 * field)
     with pytest.raises(InputError, match="a number, or one of every cell"):

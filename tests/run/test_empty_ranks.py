@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.portions import collected
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.io.reading import open_run
+from cfddem.particles import ghosts
 from cfddem.run import history
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
@@ -84,8 +86,9 @@ FEW = {
 
 @pytest.fixture(autouse=True)
 def _small_grids_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Several levels of these small grids are divided, too."""
+    """Several levels of these small grids are divided, too; space is not cut anew, which would fill all ranks."""
     monkeypatch.setattr(shared, "SMALL", 100)
+    monkeypatch.setattr(ghosts, "IMBALANCE", math.inf)
 
 
 def after(

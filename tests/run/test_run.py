@@ -61,7 +61,7 @@ def test_a_run_of_another_version_is_refused_and_left_unchanged(
     folder = shutil.copytree(undisturbed, tmp_path / "run")
     state = checkpoint.newest(folder)
     del state["simulation"]["coupling"]["last_step"]
-    monkeypatch.setattr(checkpoint, "newest", lambda _: state)
+    monkeypatch.setattr(checkpoint, "newest", lambda *_: state)
     with pytest.raises(InputError, match=r"must be a run of this version of cfddem; .* run .*case.toml again"):
         Run.resume(folder, until=0.03)
     assert open_run(folder).status == "finished"

@@ -53,7 +53,8 @@ def test_the_distribution_of_the_coating_is_measured_and_drawn() -> None:
     assert set(names) <= set(all_columns(bed()))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(liquid, "_carried", lambda solver: carried)
-        found = [getattr(liquid, name)(SimpleNamespace(particle_solver=None)) for name in names]
+        measures = {each.name: each.value for each in liquid.LiquidOnParticles.measures}
+        found = [measures[name](None, SimpleNamespace(particle_solver=None)) for name in names]
     assert found == pytest.approx([1.9 / 5.5, 1.0, 9.1 / 5.5])
     _, axes = panels()
     draw_coating(axes, carried)

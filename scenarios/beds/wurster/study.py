@@ -68,7 +68,7 @@ def circulation(run: RunData, case: Case) -> Circulation:
 
 def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None:
     """Pellets near the middle plane at some times, the mean velocity of the air, and the circulation."""
-    drawn, axes = panels(len(times) + 2, width=12.0, height=4.0, width_ratios=[*[1.0] * (len(times) + 1), 1.5])
+    drawn, axes = panels(len(times) + 2, width=11.0, height=4.0, width_ratios=[*[1.0] * (len(times) + 1), 1.5])
     middle, reach = 0.5 * case.column.width, 0.75 * case.bed.diameter
     for axis, time in zip(axes, times):
         n = int(np.abs(run.times - time).argmin())
