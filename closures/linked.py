@@ -28,13 +28,13 @@ class _WithoutAddresses:
 class _LinkedCode(JITCodeLibrary):  # type: ignore[misc]
     """Code of a function without machine code."""
 
+    inlined = False
+    """Whether it becomes part of each loop that calls it, which is optimised as a whole."""
+
     @property
     def codegen(self) -> Any:
         """Where addresses are set."""
         return _WithoutAddresses
-
-    inlined = False
-    """Whether it becomes part of each loop that calls it, which is optimised as a whole."""
 
     def _optimize_final_module(self) -> None:
         if not self.inlined:

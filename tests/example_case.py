@@ -41,6 +41,17 @@ average_from = 1.5             # s
 reference_speed = 0.1          # m/s, highest collision speed
 """
 
+GLASS = """
+[material.glass]
+density = 2420.0
+youngs_modulus = 6.0e10
+contact_modulus = 1.0e7
+poisson = 0.25
+restitution = 0.9
+friction = 0.3
+"""
+"""A material of beads, to be put into the text of a case."""
+
 MIXTURE = """
 title = "Glass beads and larger, lighter pellets"
 [fluid]

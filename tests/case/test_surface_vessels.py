@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import call
+from example_case import GLASS
 from test_case_walls import write_binary_stl
 from test_check_of_vessels import revolved
 
@@ -26,18 +27,11 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.build import laws_of, materials_of, walls_of
 from cfddem.run.initial_particles import particles_of
 
-TEXT = """
+TEXT = (
+    """
 [fluid]
 density = 1.2
 viscosity = 1.8e-5
-
-[material.glass]
-density = 2420.0
-youngs_modulus = 6.0e10
-contact_modulus = 1.0e7
-poisson = 0.25
-restitution = 0.9
-friction = 0.3
 
 [column]
 width = 0.04
@@ -58,6 +52,8 @@ inlet_velocity = 0.5
 until = 0.01
 reference_speed = 0.5
 """
+    + GLASS
+)
 
 CONE = [(0.008, 0.0), (0.018, 0.05), (0.018, 0.08)]
 """Radii and heights of the rings of a cone below a cylinder, whose ends are floor and lid of the column [m]."""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import call
+from example_case import GLASS
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
@@ -30,18 +31,11 @@ from cfddem.run.build import boundaries_of, laws_of, materials_of, walls_of
 from cfddem.run.division import require_parallel
 from cfddem.run.initial_particles import particles_of
 
-TEXT = """
+TEXT = (
+    """
 [fluid]
 density = 1.2
 viscosity = 1.8e-5
-
-[material.glass]
-density = 2420.0
-youngs_modulus = 6.0e10
-contact_modulus = 1.0e7
-poisson = 0.25
-restitution = 0.9
-friction = 0.3
 
 [column]
 width = 0.16
@@ -68,6 +62,8 @@ until = 0.5
 reference_speed = 2.5
 particle_step = 1e-5
 """
+    + GLASS
+)
 
 CONE = [(0.0, 0.03), (0.1733, 0.08), (0.24, 0.08)]
 CHAINS = {

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from example_case import GLASS
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
@@ -169,20 +170,13 @@ def test_the_nusselt_number_of_a_pipe_with_a_wall_of_one_temperature(n: int, wit
 
 # ---------------------------------------------------------------- a case
 
-CASE = """
+CASE = (
+    """
 fluid = { density = 1.2, viscosity = 1.8e-5 }
 column = { width = 0.06, height = 0.08, cell = 0.005 }
 vessel = { shape = "cone", radius = 0.015, length = 0.05 }
 bed = { diameter = 2.5e-3, height = 0.006 }
 run = { until = 0.1, reference_speed = 1.0 }
-
-[material.glass]
-density = 2420.0
-youngs_modulus = 6.0e10
-contact_modulus = 1.0e7
-poisson = 0.25
-restitution = 0.9
-friction = 0.3
 
 [patch.nozzle]
 kind = "inlet"
@@ -210,6 +204,8 @@ wall_temperature = { sides = 330.0 }
 diffusivity = 2.5e-5
 patch_fraction = { annulus = 0.02 }
 """
+    + GLASS
+)
 
 
 def test_a_hot_inlet_through_a_patch_heats_the_particles_of_a_cone_and_the_balances_hold() -> None:

@@ -14,7 +14,8 @@ from scipy.signal import find_peaks
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
-from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, legend, panels, save
+from scenarios.beds.vessel_slice import draw_spheres, draw_vessel
 
 OPEN = 0.7
 """Voidage on the axis from which a layer of the bed belongs to the spout [-]."""
@@ -82,23 +83,10 @@ def spouting(run: RunData, case: Case) -> Spouting:
 def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None:
     """Spheres near the middle plane at some times, and the voidage on the axis as the velocity falls."""
     drawn, axes = panels(len(times) + 1, width=11.0, height=3.2, width_ratios=[*[1.0] * len(times), 1.5])
-    heights, radii = np.array(case.line).T
-    middle, reach = 0.5 * case.column.width, case.bed.diameter
     for axis, time in zip(axes, times):
-        n = int(np.abs(run.times - time).argmin())
-        particles = run.particles(n)
-        position, up = particles["position"], particles["velocity"][:, 2]
-        near = np.abs(position[:, 1] - middle) < reach
-        axis.scatter(
-            position[near, 0], position[near, 2], s=20.0, c=up[near], cmap="RdBu_r", vmin=-0.6, vmax=0.6,
-            linewidths=0.3, edgecolors=GREY,
-        )  # fmt: skip
-        for side in (-1.0, 1.0):
-            axis.plot(middle + side * radii, heights, color="#222222", lw=1.6)
-        axis.set(xlim=(0.0, case.column.width), ylim=(0.0, 0.6 * case.column.height), aspect="equal")
-        axis.set_title(f"{run.times[n]:.2f} s, {case.patch['nozzle'].speed(run.times[n]):.3g} m/s", fontsize=9.5)
-        axis.set_xticks([0.0, case.column.width])
-        label(axis, "x", "m", "z", "m")
+        shown = draw_spheres(axis, run, case, time, reach=1.0, size=20.0, fastest=0.6)
+        draw_vessel(axis, case, 0.6 * case.column.height)
+        axis.set_title(f"{shown:.2f} s, {case.patch['nozzle'].speed(shown):.3g} m/s", fontsize=9.5)
     seen, curve = spouting(run, case), axes[-1]
     curve.plot(seen.time, seen.voidage, color=BLUE, label="lowest voidage on the axis")
     curve.plot(seen.time, seen.velocity / olazar(case), color=ORANGE, label="velocity / Olazar et al.")

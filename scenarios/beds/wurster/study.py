@@ -13,7 +13,8 @@ from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.case.walls import CaseWall
 from cfddem.io.reading import RunData, open_run
-from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
+from cfddem.plotting.curves import BLUE, ORANGE, legend, panels, save
+from scenarios.beds.vessel_slice import WALL, draw_spheres, draw_vessel
 
 INNER = 0.25
 """Part of the tube at each end that is left out [-]."""
@@ -69,17 +70,9 @@ def circulation(run: RunData, case: Case) -> Circulation:
 def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None:
     """Pellets near the middle plane at some times, the mean velocity of the air, and the circulation."""
     drawn, axes = panels(len(times) + 2, width=11.0, height=4.0, width_ratios=[*[1.0] * (len(times) + 1), 1.5])
-    middle, reach = 0.5 * case.column.width, 0.75 * case.bed.diameter
     for axis, time in zip(axes, times):
-        n = int(np.abs(run.times - time).argmin())
-        particles = run.particles(n)
-        position, up = particles["position"], particles["velocity"][:, 2]
-        near = np.abs(position[:, 1] - middle) < reach
-        axis.scatter(
-            position[near, 0], position[near, 2], s=11.0, c=up[near], cmap="RdBu_r", vmin=-1.5, vmax=1.5,
-            linewidths=0.3, edgecolors=GREY,
-        )  # fmt: skip
-        axis.set_title(f"{run.times[n]:.2f} s", fontsize=9.5)
+        shown = draw_spheres(axis, run, case, time, reach=0.75, size=11.0, fastest=1.5)
+        axis.set_title(f"{shown:.2f} s", fontsize=9.5)
     late = [n for n, time in enumerate(run.times) if time > 0.5 * run.times[-1]]
     velocity = np.mean([run.fluid("velocity", n)[..., 2] for n in late], axis=0)
     rows = slice(velocity.shape[1] // 2 - 1, velocity.shape[1] // 2 + 1)
@@ -89,27 +82,18 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     )  # fmt: skip
     drawn.colorbar(seen, ax=axes[-2], shrink=0.7, pad=0.04)
     axes[-2].set_title("air, upward  [m/s]", fontsize=9.5)
+    tube = tube_of(case)
+    ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
     for axis in axes[:-1]:
-        _walls(axis, case)
+        draw_vessel(axis, case, case.column.height)
+        for side in (-1.0, 1.0):
+            axis.plot(2 * [tube.point[0] + side * (tube.radius or 0.0)], ends, color=WALL, lw=1.6)
     found, curve = circulation(run, case), axes[-1]
     curve.plot(found.time, found.rising, color=BLUE, label="rise in the tube  [1/s]")
     curve.plot(found.time, found.falling, color=ORANGE, label="fall around it  [1/s]")
     curve.set(xlabel="time  [s]", ylim=(0.0, 1.3 * float(np.nanmax(found.rising))))
     legend(curve, loc="upper right")
     save(drawn, path)
-
-
-def _walls(axis: object, case: Case) -> None:
-    """The vessel and the draft tube, as seen along y."""
-    heights, radii = np.array(case.line).T
-    middle, tube = 0.5 * case.column.width, tube_of(case)
-    ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
-    for side in (-1.0, 1.0):
-        axis.plot(middle + side * radii, heights, color="#222222", lw=1.6)  # type: ignore[attr-defined]
-        axis.plot(2 * [middle + side * (tube.radius or 0.0)], ends, color="#222222", lw=1.6)  # type: ignore[attr-defined]
-    axis.set(xlim=(0.0, case.column.width), ylim=(0.0, case.column.height), aspect="equal")  # type: ignore[attr-defined]
-    axis.set_xticks([0.0, case.column.width])  # type: ignore[attr-defined]
-    label(axis, "x", "m", "z", "m")  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":
