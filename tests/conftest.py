@@ -8,7 +8,7 @@ import pytest
 import rooms  # noqa: F401  tests import each other
 
 LONGEST = (
-    "test_gallery", "test_docs", "test_golden", "test_user_laws", "test_ghosts", "test_resolved_suspension",
+    "test_gallery", "test_docs", "test_golden", "test_ghosts", "test_resolved_suspension",
     "test_wall_bridges", "test_many_bridges", "test_run", "test_bridges", "test_wet_beds",
 )  # fmt: skip
 """Files that take longest, most of it to compile loops. They come first, so that two workers end together."""
