@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.communicator import Communicator, Value
+from cfddem.backend.compile import use_threads
 
 PATIENCE = 300
 """How long a rank waits for another [s]."""
@@ -93,12 +94,16 @@ class Rank(Communicator):
         return total
 
 
-def on_ranks(size: int, program: Callable[[Communicator], Any]) -> list[Any]:
-    """Run a program on each rank; returns what it returns, in the order of ranks. The first error is raised."""
+def on_ranks(size: int, program: Callable[[Communicator], Any], threads: int | None = 1) -> list[Any]:
+    """Run a program on each rank; returns what it returns, in the order of ranks. The first error is raised.
+
+    threads  for the loops of each rank; None for all, which compiles them anew
+    """
     board, results, errors = Board(size), [None] * size, []
 
     def run(rank: int) -> None:
         with board.turn:
+            use_threads(threads)  # a new thread of Python begins with all
             try:
                 results[rank] = program(Rank(rank, board))
             except threading.BrokenBarrierError:
@@ -107,11 +112,11 @@ def on_ranks(size: int, program: Callable[[Communicator], Any]) -> list[Any]:
                 errors.append(error)
                 board.give_up()
 
-    threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    begun = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
+    for each in begun:
+        each.start()
+    for each in begun:
+        each.join()
     if errors:
         raise errors[0]
     return results

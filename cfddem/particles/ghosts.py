@@ -308,7 +308,7 @@ class StepsWithGhosts:
         )
         self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
-        self.inertia, self.wet_walls = choices["BRIDGE_INERTIA"], choices["WALLS"] and choices.get("WALL_LIQUID")
+        self.inertia, self.wet_walls = choices["BRIDGE_INERTIA"], choices.get("WALL_LIQUID")
         if self.wet_walls:
             self.requests, self.share = (specialise(each, choices) for each in (wall_requests, share_wall_liquid))
         self.ghosts, self.communicator = ghosts, communicator

@@ -51,14 +51,13 @@ from cfddem.particles.interactions.slots import (
     ROLLING,
     SHEAR,
     TRIANGLES,
-    WALLS,
     clear_contact,
     pair_forces,
     update_films,
 )
 from cfddem.particles.pair_graph import edge_role, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
-from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
+from cfddem.particles.walls.mesh_contacts import pairs_at_walls, share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
 
 # ---------------------------------------------------------------- phases
@@ -121,9 +120,8 @@ def find_forces(system, step):
         for k in range(pairs, number):
             update_edge_film(k, system, step)
     pair_forces(0, near, system, step)
-    if WALLS:
-        for k in range(pairs, number):
-            wall_contact(np.uint64(k), system, step)
+    for k in range(pairs, number):
+        wall_contact(np.uint64(k), system, step)
     if FILM and not DRIFTING:
         add_film_forces(system)
     if BOND:
@@ -151,10 +149,9 @@ def move(system, step, origin):
     if BRIDGE_INERTIA:
         reverse_films(system, step)
     largest = drift_particles(system, step, origin)
-    if WALLS:
-        largest = larger(largest, advance_walls(walls, step) ** 2)
-        if TRIANGLES:
-            share_memory(system)
+    largest = larger(largest, advance_walls(walls, step) ** 2)
+    if TRIANGLES:
+        share_memory(system)
     return largest
 
 
@@ -164,8 +161,7 @@ def find_bridge_changes(system, step):
 
     step  since the last positions; 0 if these are the same [s]
     """
-    if WALLS:
-        wall_contacts(system, system.parameters.cutoff_ratio)
+    wall_contacts(pairs_at_walls(system), system.parameters.cutoff_ratio)
     return find_changes(system, step) if BRIDGE else 0
 
 
@@ -174,8 +170,7 @@ def act_bridges(changes, system):
     """Form and break bridges, of which `find_bridge_changes` has found the number, and find the pull at walls."""
     if changes > 0:
         exchange_liquid(system)
-    if WALLS:
-        renew_wall_bridges(system)
+    renew_wall_bridges(system)
 
 
 @inline

@@ -32,7 +32,7 @@ from cfddem.particles.system import System
 from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_scales
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
-from cfddem.particles.walls.mesh_contacts import wall_contacts
+from cfddem.particles.walls.mesh_contacts import pairs_at_walls, wall_contacts
 from cfddem.particles.walls.shapes import Wall
 
 CHECK_EVERY = 20
@@ -101,8 +101,8 @@ class ParticleSolver:
         recorded = (*RECORD_FIELDS, *self.laws.bridges.collision_memory) if record else ()
         self.pair_fields = [*self.laws.fields(), *recorded]
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
-        choices = self.laws.choices() | {"WALLS": bool(walls), "RECORD": record}
-        choices["TRIANGLES"] = len(self.walls.cell_member) > 0
+        triangles = len(self.walls.cell_member) > 0
+        choices = self.laws.choices() | {"TRIANGLES": triangles, "RECORD": record}
         self.parameters = self.laws.parameters(gravity, free)
         self.choices: Mapping[str, Any] = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
         self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
@@ -341,7 +341,7 @@ class ParticleSolver:
         )  # fmt: skip
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):
-            self._touch_walls(self.system, self._reach)
+            self._touch_walls(pairs_at_walls.py_func(self.system), self._reach)
 
     def _relist(self) -> None:
         """Make a new neighbour list; memory and present forces of pairs are carried over."""

@@ -127,8 +127,11 @@ def assert_same_bits(found: dict[str, Array], alone: dict[str, Array]) -> None:
 @pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 1), (1, 2, 2)])
 @pytest.mark.parametrize("name", BEDS)
 def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
-    """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders."""
-    steps, ranks = 5, int(np.prod(shape))
+    """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders.
+
+    With all forces the ranks run on all threads.
+    """
+    steps, ranks, threads = 5, int(np.prod(shape)), None if name == "all forces" else 1
 
     def program(communicator: Communicator) -> tuple[dict[str, Array], set[int]]:
         communicator.shape = shape
@@ -137,7 +140,7 @@ def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int
         return advanced(simulation, steps), before ^ set(simulation.owned.id.tolist())
 
     alone = advanced(begun(BEDS[name]), steps)
-    for found, moved in on_ranks(ranks, program):
+    for found, moved in on_ranks(ranks, program, threads):
         assert_same_bits(found, alone)
         assert np.abs(found["imbalance"]).max() < 1e-10
         assert len(moved) > 20 or "periodic" not in name

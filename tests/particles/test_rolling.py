@@ -107,8 +107,13 @@ def test_sphere_rolls_down_a_slope_from_the_angle_of_rolling_friction() -> None:
     assert (float(rolls.particles.velocity[0, 0]) - before) / (rolls.time - begin) == pytest.approx(wanted, rel=0.01)
 
 
-@pytest.mark.parametrize("choice", CHOICES.values(), ids=CHOICES)
-@pytest.mark.parametrize("film", [False, True], ids=["dry", "film"])
+@pytest.mark.parametrize(
+    ("choice", "film"),
+    [
+        ("constant_torque", False), ("spring_dashpot", False), ("spring_dashpot", True),
+        pytest.param("constant_torque", True, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_a_pair_keeps_its_momentum(choice: str, film: bool) -> None:
     """Momentum and angular momentum of unlike spheres to 1e-12; both get the torque with opposite sign."""
     solid = BALL.model_copy(update={"rolling_friction": 0.3, "roughness": 1e-6})

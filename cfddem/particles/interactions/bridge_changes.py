@@ -31,7 +31,6 @@ from cfddem.particles.interactions.slots import (
     DRYING,
     RECORD,
     WALL_LIQUID,
-    WALLS,
     bridge_rupture,
     drawn_share,
     pair_bridges,
@@ -85,9 +84,7 @@ def find_changes(system, step):
     """
     edges = system.edges
     pair_bridges(0, edges.between_particles, system, step)
-    changes = _open_changes(system)
-    if WALLS:
-        changes += wall_changes(system)
+    changes = _open_changes(system) + wall_changes(system)
     if changes > 0:
         mark_bodies(system)
         limit_shares(system)
@@ -116,7 +113,7 @@ def exchange_liquid(system):
 @serial
 def return_liquid(system):
     """Give the liquid of marked bridges to their bodies and back, and forget the broken ones."""
-    if WALLS and WALL_LIQUID:
+    if WALL_LIQUID:
         requesting, names, amounts = wall_requests(system)
         settle_wall_liquid(system, requesting, names, amounts)
     _give_liquid(system)

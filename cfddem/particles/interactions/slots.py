@@ -136,8 +136,7 @@ returned_share = Slot("returned_share")  # (both radii, both contact angles): pa
 
 # ---------------------------------------------------------------- loops
 
-WALLS = Slot("WALLS")  # there are walls
-TRIANGLES = Slot("TRIANGLES")  # some of them are surfaces of triangles
+TRIANGLES = Slot("TRIANGLES")  # some walls are surfaces of triangles
 RECORD = Slot("RECORD")  # collisions are recorded
 pair_forces = Slot("pair_forces")
 update_films = Slot("update_films")

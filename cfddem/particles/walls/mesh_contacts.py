@@ -149,18 +149,23 @@ def _to_common(at_walls, w, common, x):
 
 
 @serial
-def wall_contacts(system, cutoff_ratio):
-    """Find the geometry of all particle-wall edges.
-
-    cutoff_ratio  reach of films over R*; 0 without films [-]
-    """
+def pairs_at_walls(system):
+    """What the geometry of particle-wall edges needs of a system: the same for all laws."""
     particles, edges, walls = system.particles, system.edges, system.walls
-    at_walls = WallPairs(
+    return WallPairs(
         edges.between_particles, edges.first, edges.second, system.memory.minimum_gap, edges.touch,
         particles.position, particles.velocity, particles.radius, system.parameters.free,
         walls.kind, walls.shape, walls.corner, walls.wall, walls.velocity, walls.spin, walls.centre, walls.shift,
         walls.turned, walls.sweep,
     )  # fmt: skip
+
+
+@serial
+def wall_contacts(at_walls, cutoff_ratio):
+    """Find the geometry of all particle-wall edges.
+
+    cutoff_ratio  reach of films over R*; 0 without films [-]
+    """
     touch(at_walls)
     if TRIANGLES:
         _share(at_walls, cutoff_ratio)
