@@ -66,9 +66,6 @@ OLD_WORDS = re.compile(
 """Words that were replaced by the terms of the field."""
 
 OLD_WORDS_ALLOWED = {
-    "cfddem/case/absent.py",  # lists renamed keys
-    "tests/case/test_case.py",
-    "tests/cli/test_command_line.py",
     "tests/package/test_structure.py",
 }
 
