@@ -44,6 +44,16 @@ class SampledFlow(NamedTuple):
     company: Array | float = 1.0  # share of the others in the solids of the cells around (N,) [-]
 
 
+class Seen(NamedTuple):
+    """The fluid around every particle, as loops over particles take it."""
+
+    slip: Array  # (N, 3) [m/s]
+    voidage: Array  # (N,); empty for 1
+    radius: Array  # of the particles (N,) [m]
+    viscosity: Array  # (N,) [Pa s]
+    density: float  # [kg/m3]
+
+
 class Own(NamedTuple):
     """What every particle adds to the flow."""
 
@@ -102,8 +112,8 @@ class FlowSampler:
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
         _sample(
-            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, own.modes, own.solid,
-            self.fluid.density, slip, disturbance, voidage, reynolds, others,
+            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, own,
+            self.fluid.density, (slip, disturbance, voidage, reynolds, others),
         )  # fmt: skip
         ratio = self._diameter_ratio(particles, cell_map, solid)
         return SampledFlow(slip, disturbance, voidage, reynolds, others, ratio)
@@ -145,17 +155,13 @@ class FlowSampler:
 
 
 @threaded
-def _sample(
-    gathered, volume, radius, velocity, viscosity, modes, own, density, slip, disturbance, voidage, reynolds, others
-):
-    """Slip, voidage, Reynolds number and number of others, each without the particle's own part.
+def _sample(gathered, volume, radius, velocity, viscosity, own, density, found):
+    """Write slip, self-disturbance, voidage, Reynolds number and number of others, without the particle's own part.
 
-    gathered     mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
-    modes        modes of the self-disturbance (N, modes, 3) [m/s]
-    own          own part of the gathered solid fraction (N,) [-]; zeros switch the correction off
-    others       per volume [1/m3]
-    disturbance  self-disturbance in the gathered velocity (N, 3) [m/s]
+    gathered  mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
+    own       `Own`; solid fractions of zero switch the correction off
     """
+    (slip, disturbance, voidage, reynolds, others), (modes, own, _) = found, own
     for n in prange(len(radius)):
         solid = gathered[n, 3]
         share = min(max(own[n] / max(solid, 1e-300), 0.0), 1.0)

@@ -185,19 +185,18 @@ def implicit_coefficients(
     """
     implicit, target = np.empty(len(value)), np.empty(value.shape)
     carried = np.empty((len(value), 1 + value.shape[1]))
-    _implicit_coefficients(conductance, capacity, value, disturbance, *last, step, implicit, target, carried)
+    _implicit_coefficients(conductance, capacity, value, disturbance, last, step, (implicit, target, carried))
     return implicit, target, carried
 
 
 @threaded
-def _implicit_coefficients(
-    conductance, capacity, value, disturbance, before, received, last_step, step, implicit, target, carried
-):  # fmt: skip
-    """b*, v*, and what each particle deposits: b* and b* v* (N, 1 + m).
+def _implicit_coefficients(conductance, capacity, value, disturbance, last, step, found):
+    """Write b*, v*, and what each particle deposits, as found.
 
     f is the change of the quantity over the last step, less what the transfer gave, per time; held values change
     nothing.
     """
+    (before, received, last_step), (implicit, target, carried) = last, found
     for n in prange(len(conductance)):
         inverse, held = 1.0 / capacity[n], not math.isfinite(capacity[n])
         stiffness = step * conductance[n] * inverse
