@@ -106,6 +106,38 @@ def test_parallel_loops_write_to_members_through_helpers_only() -> None:
     assert not lost, "\n".join(lost)
 
 
+def test_parallel_loops_write_to_no_array_of_a_tuple() -> None:
+    """On all threads, a loop loses what it writes to arrays that it has taken from a tuple that it was given."""
+    lost = []
+    for name, path in modules().items():
+        for node in ast.walk(tree(path)):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            if {each.id for each in node.decorator_list if isinstance(each, ast.Name)} & {"part", "either", "threaded"}:
+                taken = _taken_from_tuples(node)
+                for each in ast.walk(node):
+                    written = isinstance(each, ast.Subscript) and isinstance(each.ctx, ast.Store)
+                    if written and getattr(each.value, "id", "") in taken:  # type: ignore[attr-defined]
+                        lost.append(f"{name}:{each.lineno}: {ast.unparse(each)}")  # type: ignore[attr-defined]
+    assert not lost, "\n".join(lost)
+
+
+def _taken_from_tuples(function: ast.FunctionDef) -> set[str]:
+    """Names of a function that are parts of its arguments, and nothing else later."""
+    given, taken, others = {each.arg for each in function.args.args}, set[str](), set[str]()
+    for each in ast.walk(function):
+        if isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Tuple):
+            several = isinstance(each.value, ast.Tuple)
+            values = each.value.elts if isinstance(each.value, ast.Tuple) else [each.value]
+            for value, target in zip(values, each.targets[0].elts if several else each.targets):
+                names = {one.id for one in ast.walk(target) if isinstance(one, ast.Name)}
+                if isinstance(target, ast.Tuple) and getattr(value, "id", "") in given:
+                    taken |= names
+                else:
+                    others |= names
+    return taken - others
+
+
 def test_no_parameter_is_read_by_position() -> None:
     """A parameter more or less would move the others. In the text of generated loops, too."""
     text = re.compile(rf"\b({'|'.join(sorted(STRUCTURES))})\[(-?\d|$)")

@@ -26,26 +26,32 @@ def coarsen(fine, factors, farther, coupled, coarse):
     farther  how much the side with a known pressure is away, in fine cells
     coupled  (3,) whether there are several coarse cells along x, y, z
     """
+    for kc in prange(coarse[0].shape[0]):
+        _coarsen_plane(kc, fine, factors, farther, coupled, coarse)
+
+
+@inline
+def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
+    """`coarsen` in one plane."""
     (ax, ay, az, anchor), (coarse_ax, coarse_ay, coarse_az, coarse_anchor) = fine, coarse
     nz, ny, nx = ax.shape
-    for kc in prange(coarse_ax.shape[0]):
-        first_plane, end_plane = _cells_in(kc, factors[2], 0, nz)
-        for jc in range(coarse_ax.shape[1]):
-            first_row, end_row = _cells_in(jc, factors[1], 0, ny)
-            for ic in range(coarse_ax.shape[2]):
-                first, end = _cells_in(ic, factors[0], 0, nx)
-                west = south = below = held = 0.0
-                for k in range(first_plane, end_plane):
-                    for j in range(first_row, end_row):
-                        west += ax[k, j, first]
-                        for i in range(first, end):
-                            south += ay[k, j, i] if j == first_row else 0.0
-                            below += az[k, j, i] if k == first_plane else 0.0
-                            held += anchor[k, j, i]
-                coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
-                coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
-                coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
-                coarse_anchor[kc, jc, ic] = held / farther
+    first_plane, end_plane = _cells_in(kc, factors[2], 0, nz)
+    for jc in range(coarse_ax.shape[1]):
+        first_row, end_row = _cells_in(jc, factors[1], 0, ny)
+        for ic in range(coarse_ax.shape[2]):
+            first, end = _cells_in(ic, factors[0], 0, nx)
+            west = south = below = held = 0.0
+            for k in range(first_plane, end_plane):
+                for j in range(first_row, end_row):
+                    west += ax[k, j, first]
+                    for i in range(first, end):
+                        south += ay[k, j, i] if j == first_row else 0.0
+                        below += az[k, j, i] if k == first_plane else 0.0
+                        held += anchor[k, j, i]
+            coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
+            coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
+            coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
+            coarse_anchor[kc, jc, ic] = held / farther
 
 
 @threaded
