@@ -34,7 +34,7 @@ def pairs_of(velocity: InTime) -> NDArray[np.float64]:
     return np.array([(0.0, velocity)] if isinstance(velocity, float) else velocity)
 
 
-def at_times(velocity: InTime, times: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def at_times(velocity: InTime, times: NDArray[np.float64] | float) -> Any:
     """A velocity in time at some times [s], between its pairs by straight lines [m/s].
 
     >>> at_times(((0.0, 0.1), (2.0, 0.3)), 1.0), at_times(0.2, 1.0)

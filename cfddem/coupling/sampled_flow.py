@@ -161,11 +161,11 @@ def _sample(gathered, spheres, own, density, found):
     own       `Own`; solid fractions of zero switch the correction off
     """
     for n in prange(len(gathered)):
-        _sample_one(n, gathered, spheres, own, density, found)
+        _find_undisturbed(n, gathered, spheres, own, density, found)
 
 
 @inline
-def _sample_one(n, gathered, spheres, own, density, found):
+def _find_undisturbed(n, gathered, spheres, own, density, found):
     """`_sample` of one particle."""
     volume, radius, velocity, viscosity = spheres
     slip, disturbance, voidage, reynolds, others = found
