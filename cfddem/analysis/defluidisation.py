@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.case.bed import at_times
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import estimate_bed, share_of_jet
@@ -64,7 +65,7 @@ def defluidisation_of(run: RunData, case: Case) -> Defluidisation | None:
     if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
         return None
     inlet, jet, bed, time = case.bed.inlet_velocity, case.bed.jet, estimate_bed(case), history["time"]
-    speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    speed = at_times(inlet, time)
     if jet:
         speed = speed + share_of_jet(case, jet) * (jet.velocity - speed)
     joined = history["largest_agglomerate"] > 1.0  # before a spray begins, no liquid holds the particles

@@ -14,6 +14,7 @@ import numpy as np
 from cfddem.analysis.bed_laws import FROM_HEIGHT, FROM_PRESSURE, weight_over_floor
 from cfddem.analysis.measures import OF_THE_BED
 from cfddem.analysis.report_values import KeyResult, LawComparison, Measure
+from cfddem.case.bed import at_times
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.io.reading import RunData
@@ -261,11 +262,9 @@ def _classified(run: RunData, case: Case, measures: Mapping[str, Measure]) -> tu
 
 def _bed_at_end(case: Case, measure: Measure) -> BedEstimate:
     """The bed of a case at the inlet velocity with which the averaging window of a measure ends."""
-    bed, inlet = estimate_bed(case), case.bed.inlet_velocity
-    if isinstance(inlet, float) or not case.bed.highest_inlet_velocity:
-        return bed
-    last = float(np.interp(measure.drift_times[1], *np.array(inlet).T))
-    return replace(bed, inlet=bed.inlet * last / case.bed.highest_inlet_velocity)
+    bed, highest = estimate_bed(case), case.bed.highest_inlet_velocity
+    last = float(at_times(case.bed.inlet_velocity, measure.drift_times[1]))
+    return bed if last == highest else replace(bed, inlet=bed.inlet * last / highest)
 
 
 def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:

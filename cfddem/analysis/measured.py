@@ -14,6 +14,7 @@ import numpy as np
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.series import block_average
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.bed import at_times
 from cfddem.case.compare import (
     HELD,
     PROFILES,
@@ -141,9 +142,7 @@ def compared_at(run: RunData, case: Case, points: Points, begin: float) -> Measu
 
 def _at_velocities(case: Case, points: Points, time: Array, values: Array, begin: float) -> MeasuredComparison:
     """Means of a run while its inlet has the measured velocities: over the second half of each time it is held."""
-    inlet = case.bed.inlet_velocity
-    steady = isinstance(inlet, float)
-    velocity = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    steady, velocity = isinstance(case.bed.inlet_velocity, float), at_times(case.bed.inlet_velocity, time)
     computed, error = np.full((2, len(points.value)), np.nan)
     for place, wanted in enumerate(points.place):
         rows = np.flatnonzero(np.isclose(velocity, wanted, rtol=HELD, atol=0.0))

@@ -17,6 +17,7 @@ from cfddem.analysis.report_values import Citation, EnergyLine, Measure, compari
 from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, drift_of, stationarity
 from cfddem.backend.errors import InputError
+from cfddem.case.bed import at_times, pairs_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 from cfddem.preflight.summary import preflight
@@ -102,10 +103,7 @@ def window_of(run: RunData, case: Case) -> tuple[float, float]:
 
 def _start_of_means(case: Case, first: float, end: float) -> float:
     """Middle of a run, or of the time for which its inlet holds its last velocity [s]."""
-    inlet = case.bed.inlet_velocity
-    if isinstance(inlet, float):
-        return 0.5 * (first + end)
-    times, velocities = np.array(inlet).T
+    times, velocities = pairs_of(case.bed.inlet_velocity).T
     last = np.interp(end, times, velocities)
     changing = [time for time, each in zip(times, velocities) if time < end and each != last]
     begins = [time for time in times if time < end and time > max(changing, default=-math.inf)]
@@ -129,12 +127,9 @@ def _in_group(run: RunData, group: str) -> list[str]:
 
 def inlet_changes(case: Case, begin: float, end: float) -> str:
     """How the inlet velocity changes between two times [s], in words; empty if it is constant."""
-    inlet = case.bed.inlet_velocity
-    if isinstance(inlet, float):
-        return ""
-    times, velocities = np.array(inlet).T
+    times = pairs_of(case.bed.inlet_velocity)[:, 0]
     inside = np.append(times[(times > begin) & (times < end)], [begin, end])
-    within = np.interp(inside, times, velocities)
+    within = at_times(case.bed.inlet_velocity, inside)
     low, high = float(within.min()), float(within.max())
     return f"the inlet velocity changes within that time, {low:.3g} to {high:.3g} m/s" if high > low else ""
 

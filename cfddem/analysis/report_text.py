@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -88,19 +89,60 @@ class Report:
 
 def lines(result: Report) -> list[str]:
     """The report as text, at most 100 columns wide."""
+    energy = [(group, name, f"{joule} J", f"{share} %") for group, name, joule, share in energy_cells(result)]
+    shown = {each.name for each in result.key_results}
+    others = [
+        (name, mean, steady + REMARKS.get(key, ""))
+        for key, (name, mean, steady) in zip(result.measures, mean_cells(result))
+        if name not in shown
+    ]
+    blocks = (
+        _headline(result),
+        _key_results(result.key_results),
+        _measured(result.measured),
+        *(_action(*each) for each in result.actions.items()),
+        ["  all other means", *table(others, widths=(28, 28), indent=2)],
+        _laws(result),
+        [
+            "  conservation, largest relative imbalance of the run",
+            *table(ledger_cells(result), widths=(26,), indent=2),
+        ],
+        _collisions(result),
+        [f"  {film_solution(result.film_solution)}"] if result.film_solution else [],
+        [
+            f"  energy budget, of an input of {result.energy['put_in']:.4g} J",
+            *table(energy, right=(2, 3), widths=(26, 24, 14, 11), indent=2),
+        ]
+        if result.energy
+        else [],
+        _wall_time(result.wall_time),
+    )
+    return [line for block in map(list, blocks) if block for line in ("", *block)][1:]
+
+
+def mean_cells(result: Report) -> list[tuple[str, str, str]]:
+    """Name, mean with error, and steadiness of every measure."""
+    return [(spelled(name), with_error(each), steadiness(each)) for name, each in result.measures.items()]
+
+
+def law_cells(result: Report) -> list[tuple[str, ...]]:
+    """Name, value of the run, that of the law, their ratio, and the unit, of every published law."""
     return [
-        *_headline(result),
-        *_key_results(result.key_results),
-        *_measured(result.measured),
-        *_actions(result.actions),
-        *_measures(result),
-        *_laws(result.laws, result.laws_note),
-        *_ledger(result.ledger),
-        *_collisions(result.collisions),
-        *_impacts(result.impacts),
-        *_film_solution(result.film_solution),
-        *_energy(result),
-        *_wall_time(result.wall_time),
+        (row.law, f"{row.computed:.4g}", f"{row.expected:.4g}", f"{row.ratio:.3f}", shown_unit(row.unit))
+        for row in result.laws
+    ]
+
+
+def ledger_cells(result: Report) -> list[tuple[str, str]]:
+    """Name and largest imbalance of every conserved quantity."""
+    return [(spelled(name), f"{value:.2g}") for name, value in result.ledger.items()]
+
+
+def energy_cells(result: Report) -> list[tuple[str, str, str, str]]:
+    """Group, name, energy [J] and share of the input [%] of every line of the budget."""
+    return [
+        (row.group, spelled(row.name), f"{row.energy:.4g}", f"{100.0 * row.fraction:.3f}")
+        for row in result.energy_lines
     ]
 
 
@@ -161,7 +203,6 @@ def _headline(result: Report) -> Iterator[str]:
 
 
 def _key_results(found: Sequence[KeyResult]) -> Iterator[str]:
-    yield ""
     wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each.value, str)), 0)
     for each in found:
         opening = f"  {each.name:<16} {with_error(each):<{wide}} "
@@ -173,7 +214,6 @@ def _key_results(found: Sequence[KeyResult]) -> Iterator[str]:
 
 def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
     if found:
-        yield ""
         yield "  comparison with measured data"
     for each in found:
         points, outside = each["points"], each["outside"]
@@ -182,49 +222,23 @@ def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
         yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 19)
 
 
-def _measures(result: Report) -> Iterator[str]:
-    shown = {each.name for each in result.key_results}
-    yield ""
-    yield "  all other means"
-    others = {name: each for name, each in result.measures.items() if spelled(name) not in shown}
-    rows = (
-        (spelled(name), with_error(each), f"{steadiness(each)}{REMARKS.get(name, '')}") for name, each in others.items()
-    )
-    yield from table(rows, widths=(28, 28), indent=2)
+def _laws(result: Report) -> Iterator[str]:
+    if result.laws:
+        headings = ("law", "run", "law", "ratio", "unit")
+        yield from table(law_cells(result), headings, right=(1, 2, 3), widths=(40, 10, 10, 7), indent=2)
+        yield from textwrap.wrap(result.laws_note, WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
-def _laws(rows: Sequence[LawComparison], note: str) -> Iterator[str]:
-    if not rows:
-        return
-    yield ""
-    shown = (
-        (row.law, f"{row.computed:.4g}", f"{row.expected:.4g}", f"{row.ratio:.3f}", shown_unit(row.unit))
-        for row in rows
-    )
-    headings = ("law", "run", "law", "ratio", "unit")
-    yield from table(shown, headings, right=(1, 2, 3), widths=(40, 10, 10, 7), indent=2)
-    yield from textwrap.wrap(note, WIDTH, initial_indent="  ", subsequent_indent="    ")
-
-
-def _ledger(ledger: dict[str, float]) -> Iterator[str]:
-    yield ""
-    yield "  conservation, largest relative imbalance of the run"
-    yield from table(((spelled(name), f"{value:.2g}") for name, value in ledger.items()), widths=(26,), indent=2)
-
-
-def _collisions(found: dict[str, float]) -> Iterator[str]:
-    if found:
-        yield ""
+def _collisions(result: Report) -> Iterator[str]:
+    if found := result.collisions:
         yield (
             f"  {found['number']:.0f} collisions with films: median St {found['median_stokes']:.3g}; solid contact in "
             f"{100.0 * found['contact_fraction']:.3g} %, deformed by the film in "
             f"{100.0 * found['deformed_fraction']:.3g} %"
         )
-
-
-def _impacts(found: dict[str, float]) -> Iterator[str]:
-    if found:
+    if found and result.impacts:
         yield ""
+    if found := result.impacts:
         touching = f"{found['contact_rate']:.3g} of them with solid contact"
         yield f"  {found['rate']:.3g} collisions of a particle per second, {touching}"
         yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
@@ -240,23 +254,6 @@ def film_solution(found: dict[str, float]) -> str:
     )
 
 
-def _film_solution(found: dict[str, float]) -> Iterator[str]:
-    if found:
-        yield ""
-        yield f"  {film_solution(found)}"
-
-
-def _energy(result: Report) -> Iterator[str]:
-    if result.energy:
-        yield ""
-        yield f"  energy budget, of an input of {result.energy['put_in']:.4g} J"
-        rows = (
-            (row.group, spelled(row.name), f"{row.energy:.4g} J", f"{100.0 * row.fraction:.3f} %")
-            for row in result.energy_lines
-        )
-        yield from table(rows, right=(2, 3), widths=(26, 24, 14, 11), indent=2)
-
-
 def _wall_time(seconds: dict[str, float]) -> list[str]:
     total = sum(seconds.values())
     if not total:
@@ -264,16 +261,14 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     parts = sorted(seconds.items(), key=lambda each: -each[1])
     shares = ", ".join(f"{name} {100 * each / total:.0f}{NO_BREAK}%" for name, each in parts[:6])
     lines = textwrap.wrap(f"  wall time {total:.3g} s: {shares}", WIDTH, subsequent_indent="    ")
-    return ["", *(line.replace(NO_BREAK, " ") for line in lines)]
+    return [line.replace(NO_BREAK, " ") for line in lines]
 
 
-def _actions(grouped: dict[str, list[str]]) -> Iterator[str]:
-    for action, found in grouped.items():
-        yield ""
-        yield f"  {action}"
-        opening = "" if action == NOTE else "warning: "
-        for each in found:
-            yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+def _action(action: str, found: Sequence[str]) -> Iterator[str]:
+    yield f"  {action}"
+    opening = "" if action == NOTE else "warning: "
+    for each in found:
+        yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 # ---------------------------------------------------------------- Markdown
@@ -284,59 +279,39 @@ def markdown(result: Report, figures: Mapping[str, str] | None = None) -> str:
 
     figures  caption -> place of a picture
     """
-    end = result.window[1]
-    laws = (
-        (row.law, f"{row.computed:.4g}", f"{row.expected:.4g}", f"{row.ratio:.3f}", shown_unit(row.unit))
-        for row in result.laws
+    law_headings = ("law", "run", "law", "run / law", "unit")
+    actions = (
+        (f"**{action[0].upper()}{action[1:]}**", "\n".join(f"- {_escaped(each)}" for each in found))
+        for action, found in result.actions.items()
     )
+    key_results = ((f"**{each.name}**", with_error(each), each.verdict) for each in result.key_results)
+    measured = [
+        (each["name"], f"{each['points']} of {spelled(each['quantity'])}", each["verdict"]) for each in result.measured
+    ]
     parts = [
         f"# {_escaped(result.case)}",
-        f"{result.status} at {end:g} s; {_escaped(window(result))}",
-        *_markdown_table(("", "value", "verdict"), map(_key_result_cells, result.key_results)),
+        f"{result.status} at {result.window[1]:g} s; {_escaped(window(result))}",
+        _markdown_table(("", "value", "verdict"), key_results),
         *bounds_note(result),
-        *_measured_rows(result.measured),
-        *_action_lists(result.actions),
+        _markdown_table(("measured data", "points", "verdict"), measured) if measured else "",
+        *itertools.chain(*actions),
         *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
         "## Means",
-        *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result.measures.items())),
-        *(
-            ["## Published laws", *_markdown_table(("law", "run", "law", "run / law", "unit"), laws)]
-            if result.laws
-            else ()
-        ),
-        *([result.laws_note] if result.laws_note else ()),
+        _markdown_table(("measure", "mean", "in time"), mean_cells(result)),
+        *(("## Published laws", _markdown_table(law_headings, law_cells(result))) if result.laws else ()),
+        result.laws_note,
         "## Conservation",
-        *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result.ledger.items())),
-        *filter(None, [film_solution(result.film_solution)]),
+        _markdown_table(("largest imbalance", ""), ledger_cells(result)),
+        film_solution(result.film_solution),
         "## References of the laws",
         "\n".join(f"- {_escaped(f'{law.kind} {law.name} {law.reference}')}" for law in result.references),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _key_result_cells(each: KeyResult) -> tuple[str, ...]:
-    return f"**{each.name}**", with_error(each), each.verdict
-
-
-def _measured_rows(found: list[dict[str, Any]]) -> list[str]:
-    rows = ((each["name"], f"{each['points']} of {spelled(each['quantity'])}", each["verdict"]) for each in found)
-    return _markdown_table(("measured data", "points", "verdict"), rows) if found else []
-
-
-def _measure_cells(item: tuple[str, Measure]) -> tuple[str, ...]:
-    name, each = item
-    return spelled(name), with_error(each), steadiness(each)
-
-
-def _action_lists(grouped: dict[str, list[str]]) -> Iterator[str]:
-    for action, found in grouped.items():
-        yield f"**{action[0].upper()}{action[1:]}**"
-        yield "\n".join(f"- {_escaped(each)}" for each in found)
-
-
-def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
-    return ["\n".join("| " + " | ".join(map(_escaped, cells)) + " |" for cells in lines)]
+    return "\n".join("| " + " | ".join(map(_escaped, cells)) + " |" for cells in lines)
 
 
 def _escaped(text: str) -> str:

@@ -29,9 +29,23 @@ InTime = float | tuple[tuple[float, float], ...]
 """A velocity: a number, or [time, velocity] pairs [s], [m/s]."""
 
 
+def pairs_of(velocity: InTime) -> NDArray[np.float64]:
+    """The [time, velocity] pairs of a velocity in time (n, 2); a number holds from 0 on [s], [m/s]."""
+    return np.array([(0.0, velocity)] if isinstance(velocity, float) else velocity)
+
+
+def at_times(velocity: InTime, times: NDArray[np.float64] | float) -> Any:
+    """A velocity in time at some times [s], between its pairs by straight lines [m/s].
+
+    >>> at_times(((0.0, 0.1), (2.0, 0.3)), 1.0), at_times(0.2, 1.0)
+    (0.2, 0.2)
+    """
+    return np.interp(times, *pairs_of(velocity).T)
+
+
 def speeds_of(velocity: InTime) -> tuple[float, ...]:
     """Every value of a velocity in time [m/s]."""
-    return (velocity,) if isinstance(velocity, float) else tuple(speed for _, speed in velocity)
+    return tuple(pairs_of(velocity)[:, 1].tolist())
 
 
 def check_times(name: str, velocity: InTime) -> None:

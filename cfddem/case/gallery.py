@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.case.absent import absent, new_name
+from cfddem.case.absent import absent
 from cfddem.case.input_errors import sections_of
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
@@ -106,8 +106,6 @@ def full_key(key: str) -> str:
     """
     if "." in key or key in Case.model_fields:
         return key
-    if renamed := new_name(key):
-        raise InputError("key", key, f"written as {renamed}", "the key has been renamed")
     tables = {
         name: sections[0].model_fields for name, field in Case.model_fields.items() if (sections := sections_of(field))
     }

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from cfddem.backend.errors import LONGEST, InputError, nearest, shown
-from cfddem.case.absent import absent, new_key, new_value
+from cfddem.case.absent import absent
 
 MOST = 20
 """At most this many input errors are listed."""
@@ -149,10 +149,6 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
         name, _, limit = str(cause).partition(": must be ")
         return InputError(dotted((*key, name)), None, limit or str(cause))
     last = str(key[-1]) if key else ""
-    if first["type"] == "extra_forbidden" and (renamed := new_key(field)):
-        return InputError(field, None, f"written as {renamed}", "the key has been renamed")
-    if first["type"] == "literal_error" and (renamed := new_value(field, first["input"])):
-        return InputError(field, shown(first["input"]), f"written as {renamed!r}", "the value has been renamed")
     if first["type"] == "extra_forbidden":
         remedy = absent(last) or _right_table(last, owner, model)
         return InputError(field, shown(first["input"]), nearest(last, owner.model_fields), remedy)

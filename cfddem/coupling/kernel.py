@@ -302,7 +302,7 @@ class FilterKernel:
     def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
         """As `gather`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
         values = np.empty((len(now.first), len(fields)))
-        loops.gather_over_steps(*earlier, *last, *now, self._corners, self._layered(fields), values)
+        loops.gather_over_steps(earlier, last, now, self._corners, self._layered(fields), values)
         return values
 
     def between_centres(self, field: Array, position: Array) -> Array:
@@ -407,10 +407,8 @@ class FilterKernel:
         carried = [
             np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(whole.shape)), np.int64) for axis in range(3)
         ]
-        loops.carry_all(
-            old.position, moved, old.radius, volume, unit, self._offsets, self._linear, self._axes.origin,
-            self._axes.inverse, self.periodic, *carried,
-        )  # fmt: skip
+        paths = loops.Paths(old.position, moved, old.radius, volume)
+        loops.carry_all(paths, unit, self._offsets, self._linear, self._axes, self.periodic, tuple(carried))
         for axis, own in enumerate(carried):
             total = np.asarray(self.communicator.sum(own, axis=()))
             ends = np.moveaxis(total, 2 - axis, 0)

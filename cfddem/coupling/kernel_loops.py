@@ -253,8 +253,9 @@ def gather_with_slope(first, shares, corners, field, inverse, values):
 
 
 @threaded
-def gather_over_steps(earlier, shares_earlier, last, shares_last, now, shares_now, corners, fields, values):
-    """As `gather`, the mean of particles at three places, with the weights 1/4, 1/2 and 1/4."""
+def gather_over_steps(at_earlier, at_last, at_now, corners, fields, values):
+    """As `gather`, the mean of particles at the stencils of three places, with the weights 1/4, 1/2 and 1/4."""
+    (earlier, shares_earlier), (last, shares_last), (now, shares_now) = at_earlier, at_last, at_now
     quarter = 0.25 / now.shape[1]
     for n in prange(len(values)):
         for m in range(values.shape[1]):
@@ -305,41 +306,52 @@ def _window(coordinate, linear, first, cells, periodic, weights):
         weights[cell - first] += share if step else 1.0 - share
 
 
+class Paths(NamedTuple):
+    """Spheres that move along straight paths."""
+
+    position: Array  # at the beginning (N, 3) [m]
+    moved: Array  # (N, 3) [m]
+    radius: Array  # (N,) [m]
+    volume: Array  # (N,) [m3]
+
+
 @serial
-def carry_all(
-    position, moved, radius, volume, unit, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z
-):
-    """Volume, in whole numbers of 1/unit [m3], that every particle carries through every face along a straight path.
+def carry_all(paths, unit, offsets, linear, axes, periodic, fluxes):
+    """Volume, in whole numbers of 1/unit [m3], that every particle carries through every face along its path.
 
     Esirkepov's split: along each axis the change of the one-dimensional weights, times the mean of the weights of the
     two other axes at both ends. The three fluxes together give exactly the change of the product.
+
+    fluxes  through the faces normal to x, y, z
     """
+    position, moved, radius, volume = paths
+    flux_x, flux_y, flux_z = fluxes
     nz, ny, nx = flux_x.shape[0], flux_x.shape[1], flux_y.shape[2]
-    old_x, new_x, old_y = np.zeros(6), np.zeros(6), np.zeros(6)
-    new_y, old_z, new_z = np.zeros(6), np.zeros(6), np.zeros(6)
+    cells, old, new = (nx, ny, nz), (np.zeros(6), np.zeros(6), np.zeros(6)), (np.zeros(6), np.zeros(6), np.zeros(6))
     for n in range(len(position)):
         for s in range(len(offsets)):
-            x = (position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0]
-            y = (position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1]
-            z = (position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2]
-            i, j, k = math.floor(x) - 2, math.floor(y) - 2, math.floor(z) - 2
-            _window(x, linear, i, nx, periodic[0], old_x)
-            _window(x + moved[n, 0] * inverse[0], linear, i, nx, periodic[0], new_x)
-            _window(y, linear, j, ny, periodic[1], old_y)
-            _window(y + moved[n, 1] * inverse[1], linear, j, ny, periodic[1], new_y)
-            _window(z, linear, k, nz, periodic[2], old_z)
-            _window(z + moved[n, 2] * inverse[2], linear, k, nz, periodic[2], new_z)
+            x = (position[n, 0] + radius[n] * offsets[s, 0] - axes.origin[0]) * axes.inverse[0]
+            y = (position[n, 1] + radius[n] * offsets[s, 1] - axes.origin[1]) * axes.inverse[1]
+            z = (position[n, 2] + radius[n] * offsets[s, 2] - axes.origin[2]) * axes.inverse[2]
+            place, first = (x, y, z), (math.floor(x) - 2, math.floor(y) - 2, math.floor(z) - 2)
+            for d in range(3):
+                _window(place[d], linear, first[d], cells[d], periodic[d], old[d])
+                there = place[d] + moved[n, d] * axes.inverse[d]
+                _window(there, linear, first[d], cells[d], periodic[d], new[d])
             part = volume[n] / len(offsets)
-            _carry(unit, part, i, j, k, nx, ny, nz, old_x, new_x, old_y, new_y, old_z, new_z, 0, flux_x)
-            _carry(unit, part, j, i, k, ny, nx, nz, old_y, new_y, old_x, new_x, old_z, new_z, 1, flux_y)
-            _carry(unit, part, k, i, j, nz, nx, ny, old_z, new_z, old_x, new_x, old_y, new_y, 2, flux_z)
+            _carry(unit, part, first, cells, old, new, 0, flux_x)
+            _carry(unit, part, first, cells, old, new, 1, flux_y)
+            _carry(unit, part, first, cells, old, new, 2, flux_z)
 
 
 @serial
-def _carry(
-    unit, part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old_b, new_b, old_c, new_c, axis, flux
-):
-    """Add the volume that one piece carries through the faces normal to one axis."""
+def _carry(unit, part, first, cells, old, new, axis, flux):
+    """Add the volume that one piece carries through the faces normal to one axis.
+
+    first  cell of the windows along x, y, z, whose weights are `old` and `new`
+    """
+    one, other = (1 if axis == 0 else 0), (1 if axis == 2 else 2)  # the axes across
+    old_a, new_a, old_b, new_b, old_c, new_c = old[axis], new[axis], old[one], new[one], old[other], new[other]
     for c in range(6):
         for b in range(6):
             across = (old_b[b] * old_c[c] + new_b[b] * new_c[c]) / 3.0
@@ -348,13 +360,14 @@ def _carry(
                 continue
             passed = 0.0
             for a in range(5):
-                passed -= part * (new[a] - old[a]) * across
+                passed -= part * (new_a[a] - old_a[a]) * across
                 if passed == 0.0:
                     continue
-                face, other, third = (first + a + 1) % cells, (first_b + b) % cells_b, (first_c + c) % cells_c
+                face = (first[axis] + a + 1) % cells[axis]
+                beside, third = (first[one] + b) % cells[one], (first[other] + c) % cells[other]
                 if axis == 0:
-                    flux[third, other, face] += np.int64(np.rint(passed * unit))
+                    flux[third, beside, face] += np.int64(np.rint(passed * unit))
                 elif axis == 1:
-                    flux[third, face, other] += np.int64(np.rint(passed * unit))
+                    flux[third, face, beside] += np.int64(np.rint(passed * unit))
                 else:
-                    flux[face, third, other] += np.int64(np.rint(passed * unit))
+                    flux[face, third, beside] += np.int64(np.rint(passed * unit))

@@ -44,6 +44,16 @@ class SampledFlow(NamedTuple):
     company: Array | float = 1.0  # share of the others in the solids of the cells around (N,) [-]
 
 
+class Seen(NamedTuple):
+    """The fluid around every particle, as loops over particles take it."""
+
+    slip: Array  # (N, 3) [m/s]
+    voidage: Array  # (N,); empty for 1
+    radius: Array  # of the particles (N,) [m]
+    viscosity: Array  # (N,) [Pa s]
+    density: float  # [kg/m3]
+
+
 class Own(NamedTuple):
     """What every particle adds to the flow."""
 
@@ -101,10 +111,8 @@ class FlowSampler:
         own = self.own(particles, cell_map)
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
-        _sample(
-            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, own.modes, own.solid,
-            self.fluid.density, slip, disturbance, voidage, reynolds, others,
-        )  # fmt: skip
+        spheres = cell_map.volume, particles.radius, particles.velocity, particles.viscosity
+        _sample(gathered, spheres, own, self.fluid.density, (slip, disturbance, voidage, reynolds, others))
         ratio = self._diameter_ratio(particles, cell_map, solid)
         return SampledFlow(slip, disturbance, voidage, reynolds, others, ratio)
 
@@ -145,31 +153,35 @@ class FlowSampler:
 
 
 @threaded
-def _sample(
-    gathered, volume, radius, velocity, viscosity, modes, own, density, slip, disturbance, voidage, reynolds, others
-):
-    """Slip, voidage, Reynolds number and number of others, each without the particle's own part.
+def _sample(gathered, spheres, own, density, found):
+    """Write slip, self-disturbance, voidage, Reynolds number and number of others, without the particle's own part.
 
-    gathered     mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
-    modes        modes of the self-disturbance (N, modes, 3) [m/s]
-    own          own part of the gathered solid fraction (N,) [-]; zeros switch the correction off
-    others       per volume [1/m3]
-    disturbance  self-disturbance in the gathered velocity (N, 3) [m/s]
+    gathered  mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
+    spheres   volume, radius, velocity and viscosity
+    own       `Own`; solid fractions of zero switch the correction off
     """
-    for n in prange(len(radius)):
-        solid = gathered[n, 3]
-        share = min(max(own[n] / max(solid, 1e-300), 0.0), 1.0)
-        others[n] = max(solid - own[n], 0.0) / volume[n]
-        voidage[n] = 1.0 - max(solid - share * own[n], 0.0)
-        square = 0.0
-        for d in range(3):
-            disturbed = 0.0
-            for k in range(modes.shape[1]):
-                disturbed += modes[n, k, d]
-            disturbance[n, d] = share * disturbed
-            slip[n, d] = gathered[n, d] - disturbance[n, d] - velocity[n, d]
-            square += slip[n, d] * slip[n, d]
-        reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity[n], 1e-300)
+    for n in prange(len(gathered)):
+        _find_undisturbed(n, gathered, spheres, own, density, found)
+
+
+@inline
+def _find_undisturbed(n, gathered, spheres, own, density, found):
+    """`_sample` of one particle."""
+    volume, radius, velocity, viscosity = spheres
+    slip, disturbance, voidage, reynolds, others = found
+    solid, alone = gathered[n, 3], own.solid[n]
+    share = min(max(alone / max(solid, 1e-300), 0.0), 1.0)
+    others[n] = max(solid - alone, 0.0) / volume[n]
+    voidage[n] = 1.0 - max(solid - share * alone, 0.0)
+    square = 0.0
+    for d in range(3):
+        disturbed = 0.0
+        for k in range(own.modes.shape[1]):
+            disturbed += own.modes[n, k, d]
+        disturbance[n, d] = share * disturbed
+        slip[n, d] = gathered[n, d] - disturbance[n, d] - velocity[n, d]
+        square += slip[n, d] * slip[n, d]
+    reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity[n], 1e-300)
 
 
 # ---------------------------------------------------------------- gradient of the velocity

@@ -22,6 +22,7 @@ subtracted that the particle has in the solids gathered at its place.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -110,12 +111,22 @@ class SelfDisturbance(FluidForce):
         density    of the fluid [kg/m3]
         """
         numbers = np.arange(particles.count)
+        pushed = Pushed(cell_map.position, drag, slip, screening, density, particles.viscosity, step)
         for kind, rows in self._kernel.of_each_kind(cell_map.radius):
             left = self._walls[kind].left(cell_map.position[rows]) if self._walls else np.empty((0, 0, 3))
-            _build_up(
-                numbers[rows], cell_map.position, *self._cell, drag, slip, screening, *self._tables[kind], density,
-                particles.viscosity, step, left, particles.disturbance_modes,
-            )  # fmt: skip
+            _build_up(numbers[rows], pushed, self._cell, self._tables[kind], left, particles.disturbance_modes)
+
+
+class Pushed(NamedTuple):
+    """What particles do to the fluid in a step; see `SelfDisturbance.advance`."""
+
+    position: Array  # at which they deposit (N, 3) [m]
+    drag: Array  # (N, 3) [N]
+    slip: Array  # (N, 3) [m/s]
+    screening: Array  # (N,) [1/s]
+    density: float  # [kg/m3]
+    viscosity: Array  # (N,) [Pa s]
+    step: float  # [s]
 
 
 @inline
@@ -128,15 +139,18 @@ def _steady(moving, slowest, wave_number, shares):
 
 
 @threaded
-def _build_up(
-    rows, position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
-    viscosity, step, left, modes_of,
-):  # fmt: skip
+def _build_up(rows, pushed, cell, tables, left, modes_of):
     """Exact relaxation of every mode of some particles towards its value under a steady force.
 
-    rows  of these particles
-    left  share that walls leave, by place among the rows; empty without walls
+    rows    of these particles
+    pushed  `Pushed`
+    cell    origin and inverse spacing of the grid, and whether the mapping is linear
+    tables  `Tables`
+    left    share that walls leave, by place among the rows; empty without walls
     """
+    position, drag, slip, screening, density, viscosity, step = pushed
+    origin, inverse, linear = cell
+    flow, rates, start, slowest, moving = tables
     modes = rates.shape[1]
     for place in prange(len(rows)):
         n = rows[place]

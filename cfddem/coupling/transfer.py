@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
@@ -185,30 +185,35 @@ def implicit_coefficients(
     """
     implicit, target = np.empty(len(value)), np.empty(value.shape)
     carried = np.empty((len(value), 1 + value.shape[1]))
-    _implicit_coefficients(conductance, capacity, value, disturbance, *last, step, implicit, target, carried)
+    _implicit_coefficients(conductance, capacity, value, disturbance, last, step, (implicit, target, carried))
     return implicit, target, carried
 
 
 @threaded
-def _implicit_coefficients(
-    conductance, capacity, value, disturbance, before, received, last_step, step, implicit, target, carried
-):  # fmt: skip
-    """b*, v*, and what each particle deposits: b* and b* v* (N, 1 + m).
+def _implicit_coefficients(conductance, capacity, value, disturbance, last, step, found):
+    """Write b*, v*, and what each particle deposits, as found.
 
     f is the change of the quantity over the last step, less what the transfer gave, per time; held values change
     nothing.
     """
     for n in prange(len(conductance)):
-        inverse, held = 1.0 / capacity[n], not math.isfinite(capacity[n])
-        stiffness = step * conductance[n] * inverse
-        theta = implicitness(stiffness)
-        implicit[n] = conductance[n] / (1.0 + theta * stiffness)
-        carried[n, 0] = implicit[n]
-        for d in range(value.shape[1]):
-            gained = 0.0 if held else capacity[n] * (value[n, d] - before[n, d])
-            other = (gained - received[n, d]) / last_step
-            target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other
-            carried[n, 1 + d] = implicit[n] * target[n, d]
+        _implicit_one(n, conductance, capacity, value, disturbance, last, step, found)
+
+
+@inline
+def _implicit_one(n, conductance, capacity, value, disturbance, last, step, found):
+    """`_implicit_coefficients` of one particle."""
+    (before, received, last_step), (implicit, target, carried) = last, found
+    inverse, held = 1.0 / capacity[n], not math.isfinite(capacity[n])
+    stiffness = step * conductance[n] * inverse
+    theta = implicitness(stiffness)
+    implicit[n] = conductance[n] / (1.0 + theta * stiffness)
+    carried[n, 0] = implicit[n]
+    for d in range(value.shape[1]):
+        gained = 0.0 if held else capacity[n] * (value[n, d] - before[n, d])
+        other = (gained - received[n, d]) / last_step
+        target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other
+        carried[n, 1 + d] = implicit[n] * target[n, d]
 
 
 @threaded

@@ -34,6 +34,8 @@ relaxes by 1/(1 + z + z^2/2), never past its target.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
@@ -109,18 +111,46 @@ def line(field, start, count):
     return field[start : start + count]
 
 
+class Medium(NamedTuple):
+    """What does not change in the momentum balance of a fluid."""
+
+    density: float  # rho [kg/m3]
+    inverse: Array  # 1/spacing along x, y, z (3,) [1/m]
+    central: float  # 1 for central convection, 0 for the MC limiter
+    model_b: float  # 1 for model B, 0 for model A
+
+
+class Balance(NamedTuple):
+    """What the momentum balance of a step is made of: padded faces (3, ...) and cells."""
+
+    old: Array  # faces, velocity before the step [m/s]
+    force_a: Array  # faces, results of `transport` at the start and in the stage [N/m3]
+    force_b: Array
+    pressure: Array  # p' [Pa]
+    stored: Array  # voidage that is stored with the old velocity,
+    centred: Array  # that of the middle of the step,
+    voidage: Array  # and that stored with the new velocity
+    drag: Array  # beta [kg/m3/s]
+    drag_momentum: Array  # (3, ...) beta v [N/m3]
+    source: Array  # (3, ...) [N/m3]
+    driving: Array  # mean pressure fall (3,) [Pa/m]
+    solved: Array  # faces, 1 where one carries an unknown
+
+
 @threaded
-def transport(velocity, voidage, viscosity, buried, density, inverse, central, flux, expansion, rate):
+def transport(velocity, voidage, viscosity, buried, medium, flux, expansion, rate):
     """rate = div(eps tau) - div(rho eps u u) on every face of the box; also writes flux and expansion.
 
     velocity, flux (eps u), rate (3, ...); voidage, viscosity (eps mu [Pa s]), expansion (2/3 eps mu div u)
     padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half
-    way; inverse 1/spacing along x, y, z [1/m].
+    way; medium `Medium`.
     """
+    inverse = medium.inverse
     shape, step = voidage.shape, strides(voidage.shape)
     voidage, viscosity, expansion = voidage.reshape(-1), viscosity.reshape(-1), expansion.reshape(-1)
     velocity, flux = velocity.reshape(3, -1), flux.reshape(3, -1)
     buried, rate = buried.reshape(3, -1), rate.reshape(3, -1)
+    moving = velocity, flux, viscosity, buried
     for k in prange(LOW - 1, shape[0] - LOW + 1):
         at, n = inside(k, shape, 1)
         for d in range(3):
@@ -143,23 +173,26 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
             for i in range(n):
                 out[i] = (left[i] - right[i]) * inverse[d]
             for e in range(3):
-                _balance(
-                    out, velocity[d], velocity[e], flux[e], viscosity, buried[d], at, step[d], step[e],
-                    density, inverse[e], inverse[d], central,
-                )  # fmt: skip
+                _balance(out, moving, at, step, medium, d, e)
 
 
 @vector_inline
-def _balance(out, u, v, flux, viscosity, buried, at, d, e, density, inverse_e, inverse_d, central):
+def _balance(out, moving, at, step, medium, along, across):
     """Add to a line of the component u_d the balance over its two momentum faces along e; v is u_e.
 
     Across the component (e != d) these faces lie around edges of the grid, between the cells right and left of the
     face and those below or above them; along it (e == d) they are the centres of the two cells, where the same
     differences of u = v give twice the stretching.
 
-    at    place of the line in flat fields
-    d, e  distance of the next cell along both directions there
+    moving         velocity, flux, viscosity and buried faces
+    at             place of the line in flat fields
+    step           distance of the next cell along x, y, z there
+    along, across  the directions d and e
     """
+    velocity, fluxes, viscosity, buried_faces = moving
+    u, v, flux, buried = velocity[along], velocity[across], fluxes[across], buried_faces[along]
+    d, e, inverse_d, inverse_e = step[along], step[across], medium.inverse[along], medium.inverse[across]
+    density, central = medium.density, medium.central
     n = out.size
     u0, u1, u2 = line(u, at - 2 * e, n), line(u, at - e, n), line(u, at, n)
     u3, u4 = line(u, at + e, n), line(u, at + 2 * e, n)
@@ -191,17 +224,14 @@ def _balance(out, u, v, flux, viscosity, buried, at, d, e, density, inverse_e, i
 
 
 @threaded
-def predict(
-    old, rate_a, rate_b, weight_b, pressure, stored, centred, voidage, drag, drag_momentum, source, driving, solved,
-    density, step, inverse, model_b, new, mobility,
-):  # fmt: skip
+def predict(balance, medium, step, weight_b, new, mobility):
     """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
 
-    old, new, mobility (3, ...) velocities [m/s] and [m2 s/kg]; rate_a, rate_b (3, ...) results of `transport`, the
-    second counting weight_b; pressure p' [Pa]; stored, centred, voidage: that stored with the old velocity, that of
-    the middle of the step, that stored with the new velocity; drag beta [kg/m3/s], drag_momentum beta v and source
-    [N/m3], cell fields; driving mean pressure fall [Pa/m]; solved (3, ...) 1 where a face carries an unknown.
+    weight_b       of the second of both forces
+    new, mobility  (3, ...) [m/s] and [m2 s/kg]
     """
+    old, rate_a, rate_b, pressure, stored, centred, voidage, drag, drag_momentum, source, driving, solved = balance
+    density, inverse, _, model_b = medium
     shape, steps = voidage.shape, strides(voidage.shape)
     voidage, centred, stored = voidage.reshape(-1), centred.reshape(-1), stored.reshape(-1)
     pressure, drag = pressure.reshape(-1), drag.reshape(-1)
@@ -243,9 +273,14 @@ def predict(
 
 
 @inline
-def half_of_drag(voidage, drag, other_voidage, other_drag, free, old, new, density, step, model_b):
-    """Half of the weight with which the drag of a cell acts on one of its faces, and u_theta there."""
-    other_voidage, other_drag = (other_voidage, other_drag) if free > 0.0 else (voidage, drag)
+def half_of_drag(here, other, free, velocity, medium, step):
+    """Half of the weight with which the drag of a cell acts on one of its faces, and u_theta there.
+
+    here, other  voidage and drag of the cell, and of the one beyond the face
+    velocity     of the face before and after the step
+    """
+    (voidage, drag), (old, new), density, model_b = here, velocity, medium.density, medium.model_b
+    other_voidage, other_drag = other if free > 0.0 else here
     face = 0.5 * (voidage + other_voidage)
     own = slip_weight(face, voidage, model_b)
     beta = 0.5 * (own * drag + slip_weight(face, other_voidage, model_b) * other_drag)
@@ -254,11 +289,12 @@ def half_of_drag(voidage, drag, other_voidage, other_drag, free, old, new, densi
 
 
 @threaded
-def drag_seen(old, new, voidage, drag, solved, density, step, model_b, weight, seen):
+def drag_seen(balance, new, medium, step, weight, seen):
     """Weight W and velocity u_d with which the drag of every cell has acted over a step: half on each face.
 
     weight, seen  padded (3, ...); only cells are written
     """
+    old, voidage, drag, solved = balance.old, balance.centred, balance.drag, balance.solved
     shape, steps = voidage.shape, strides(voidage.shape)
     voidage, drag, solved = voidage.reshape(-1), drag.reshape(-1), solved.reshape(3, -1)
     old, new, weight, seen = old.reshape(3, -1), new.reshape(3, -1), weight.reshape(3, -1), seen.reshape(3, -1)
@@ -274,14 +310,9 @@ def drag_seen(old, new, voidage, drag, solved, density, step, model_b, weight, s
             new_low, new_high = line(new[d], at, n), line(new[d], above, n)
             out, out_seen = line(weight[d], at, n), line(seen[d], at, n)
             for i in range(n):
-                low, u_low = half_of_drag(
-                    e_here[i], b_here[i], e_below[i], b_below[i], free_low[i], old_low[i], new_low[i],
-                    density, step, model_b,
-                )  # fmt: skip
-                high, u_high = half_of_drag(
-                    e_here[i], b_here[i], e_above[i], b_above[i], free_high[i], old_high[i], new_high[i],
-                    density, step, model_b,
-                )  # fmt: skip
+                here, below_it, above_it = (e_here[i], b_here[i]), (e_below[i], b_below[i]), (e_above[i], b_above[i])
+                low, u_low = half_of_drag(here, below_it, free_low[i], (old_low[i], new_low[i]), medium, step)
+                high, u_high = half_of_drag(here, above_it, free_high[i], (old_high[i], new_high[i]), medium, step)
                 out[i] = low + high
                 out_seen[i] = (low * u_low + high * u_high) / (low + high)
 
@@ -322,33 +353,32 @@ class FlowRates:
 
     def of(self, velocity: Array, voidage: Array, effective_viscosity: Array) -> Rates:
         """Largest rates of a padded velocity, voidage, and voidage times viscosity [Pa s]."""
-        largest_rates(
-            velocity, voidage, effective_viscosity, self._open, self._density, self._inverse_where_varied,
-            *self._by_plane,
-        )  # fmt: skip
+        flow = velocity, voidage, effective_viscosity, self._open
+        largest_rates(flow, self._density, self._inverse_where_varied, *self._by_plane)
         return Rates(*(float(rate) for rate in self._communicator.largest(self._by_plane, axis=1)))
 
 
 @threaded
-def largest_rates(velocity, voidage, viscosity, open_cells, density, inverse, advection, viscous, fluxes):
+def largest_rates(flow, density, inverse, advection, viscous, fluxes):
     """Write the largest rates of each plane of cells, in the units of `Rates`.
 
-    viscosity is eps mu. The viscous rate of a cell combines its voidage with the largest viscosity among the cell and
+    flow  velocity, voidage, eps mu, and 1 in open cells
+
+    The viscous rate of a cell combines its voidage with the largest viscosity among the cell and
     its six neighbours.
     """
-    nz, ny, nx = open_cells.shape
+    nz, ny, nx = flow[3].shape
     for k in prange(nz):
         largest = np.zeros((3, nx))  # of the cells at each place in a row
         for j in range(ny):
-            _row_rates(
-                k, j, velocity, voidage, viscosity, open_cells, density, inverse, largest[0], largest[1], largest[2]
-            )
+            _row_rates(k, j, flow, density, inverse, (largest[0], largest[1], largest[2]))
         advection[k], viscous[k], fluxes[k] = largest[0].max(), largest[1].max(), largest[2].max()  # local: a plane
 
 
 @vector_inline
-def _row_rates(k, j, velocity, voidage, viscosity, open_cells, density, inverse, advection, viscous, fluxes):
+def _row_rates(k, j, flow, density, inverse, largest):
     """Raise the largest rates at every place in a row to those of row j in plane k."""
+    (velocity, voidage, viscosity, open_cells), (advection, viscous, fluxes) = flow, largest
     n, b, c, i = fluxes.size, j + LOW, k + LOW, LOW
     u0, u1 = velocity[0, c, b, i : i + n], velocity[0, c, b, i + 1 : i + 1 + n]
     v0, v1 = velocity[1, c, b, i : i + n], velocity[1, c, b + 1, i : i + n]

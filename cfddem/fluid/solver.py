@@ -32,7 +32,7 @@ from cfddem.fluid.checks import checked_field, checked_viscosity, checked_voidag
 from cfddem.fluid.conditions import Condition
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
-from cfddem.fluid.momentum import FlowRates, drag_seen, in_cells, predict, transport
+from cfddem.fluid.momentum import Balance, FlowRates, Medium, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
@@ -114,8 +114,8 @@ class FluidSolver:
         self.followers: list[Any] = []
         self.body_forces: list[Callable[[], Array]] = []
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
-        self.model_b, self._central = float(model == "B"), float(convection == "central")
-        self.inverse_spacing = 1.0 / np.array(grid.spacing)
+        self.model_b, self.inverse_spacing = float(model == "B"), 1.0 / np.array(grid.spacing)
+        self._medium = Medium(self.density, self.inverse_spacing, float(convection == "central"), self.model_b)
         self.face_areas = np.array([grid.face_area(d) for d in range(3)])
         self.open_cells = grid.open.astype(float)
         self._every_face = np.ones_like(self.faces.solved)
@@ -155,7 +155,7 @@ class FluidSolver:
 
         # First stage: carried by the old flux, and stored with the voidage that agrees with that flux.
         self._set_cells(fields.stored_voidage, fields.owned("other_voidage") - step * fields.owned("voidage_rate"))
-        self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force, self.density, self._central)
+        self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force, self._medium)
         self._predict(fields.stage_velocity, step, weight=0.0)
         scale = self._flux_scale(step)
         loose = max(LOOSE, self.tolerance)
@@ -165,9 +165,7 @@ class FluidSolver:
         np.copyto(fields.stored_voidage, fields.mean_voidage)
         tight = self.tolerance * scale
         for passes in range(1, self.passes + 1):
-            self._find_explicit_force(
-                fields.stage_velocity, fields.other_voidage, fields.stage_force, self.density, self._central
-            )
+            self._find_explicit_force(fields.stage_velocity, fields.other_voidage, fields.stage_force, self._medium)
             self._predict(fields.other_velocity, step, weight=0.5)
             iterations.append(self._project(fields.other_velocity, fields.other_voidage, tight, scale, fresh=False))
             if passes == self.passes or not self._still_moves(step):
@@ -209,17 +207,15 @@ class FluidSolver:
         self.grid.inner(padded)[:] = cells
         self.boundaries.halo.fill(padded)
 
-    def _find_explicit_force(
-        self, velocity: Array, voidage: Array, force: Array, density: float, central: float
-    ) -> None:
+    def _find_explicit_force(self, velocity: Array, voidage: Array, force: Array, medium: Medium) -> None:
         """Write convection and viscous stress on the faces [N/m3]."""
         fields = self.fields
         self._effective.update(velocity, voidage, fields.viscosity, fields.effective_viscosity)
         transport(
-            velocity, voidage, fields.effective_viscosity, self.faces.buried, density, self.inverse_spacing, central,
-            fields.flux, fields.expansion, force,
+            velocity, voidage, fields.effective_viscosity, self.faces.buried, medium, fields.flux, fields.expansion,
+            force,
         )  # fmt: skip
-        self.walls.replace(velocity, fields.effective_viscosity, density, central, force)
+        self.walls.replace(velocity, fields.effective_viscosity, medium.density, medium.central, force)
 
     def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
         """Correct a velocity and the pressure so that continuity holds; returns the iterations it took."""
@@ -227,16 +223,19 @@ class FluidSolver:
 
     def _predict(self, new: Array, step: float, weight: float) -> None:
         """Write the velocity after the step with the pressure as it is; the second explicit force has this weight."""
-        fields = self.fields
-        self.boundaries.fill_pressure(fields.pressure)
-        predict(
-            fields.velocity, fields.start_force, fields.stage_force, weight, fields.pressure, fields.stored_voidage,
-            fields.centred_voidage, fields.other_voidage, fields.drag, fields.drag_momentum, fields.source,
-            self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
-            new, fields.mobility,
-        )  # fmt: skip
+        self.boundaries.fill_pressure(self.fields.pressure)
+        predict(self._balance(self.fields.velocity), self._medium, step, weight, new, self.fields.mobility)
         self.walls.hold(new, self.density, self.model_b, step, weight)
         self.boundaries.set_faces(new)
+
+    def _balance(self, old: Array) -> Balance:
+        """What a step is made of, from its old velocity on."""
+        fields = self.fields
+        return Balance(
+            old, fields.start_force, fields.stage_force, fields.pressure, fields.stored_voidage,
+            fields.centred_voidage, fields.other_voidage, fields.drag, fields.drag_momentum, fields.source,
+            self.boundaries.driving, self.faces.solved,
+        )  # fmt: skip
 
     def _flux_scale(self, step: float) -> float:
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
@@ -465,10 +464,7 @@ class FluidSolver:
         """
         fields = self.fields
         weight, seen = np.empty((2, *fields.velocity.shape))
-        drag_seen(
-            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
-            self.density, self.last_step, self.model_b, weight, seen,
-        )  # fmt: skip
+        drag_seen(self._balance(fields.other_velocity), fields.velocity, self._medium, self.last_step, weight, seen)
         return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(seen), 0, -1)
 
     def _in_cells(self, faces: Array, counted: Array) -> Array:
@@ -483,7 +479,8 @@ class FluidSolver:
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:
         """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
         force = np.zeros_like(velocity)
-        self._find_explicit_force(velocity, voidage, force, density=0.0, central=0.0)  # no convection is left
+        still = self._medium._replace(density=0.0, central=0.0)  # no convection is left
+        self._find_explicit_force(velocity, voidage, force, still)
         return force
 
     # ------------------------------------------------------------ values at points

@@ -78,9 +78,7 @@ def movie(
         raise InputError("output", str(output), "a file that ends in .gif or .mp4")
     if output.suffix.lower() == ".mp4":
         _require_ffmpeg()
-    count = len(run.times)
-    examined = sorted(set(np.linspace(0, count - 1, min(count, _MOST_EXAMINED)).astype(int).tolist()))
-    stage = Stage.of(run, examined, show, colour, cut)
+    stage = Stage.of(run, spread_over(run, _MOST_EXAMINED), show, colour, cut)
     fresh = output.with_name(f".{output.stem}{PARTIAL}{output.suffix}")
     fresh.unlink(missing_ok=True)
     try:
@@ -181,9 +179,8 @@ class Stage:
                 raise InputError("show", name, f"a recorded field of the fluid; this run has {fields or 'none'}")
         if "spheres" in panels or "bubbles" in panels:
             rendering.require_rendering()
-        bounds = with_walls(bounds_of(run, snapshots), run) if run.grid is None else bounds_of(run, snapshots)
-        size = np.diff(bounds, axis=1).ravel()
-        depth = 0 if size[0] < size[1] else 1
+        bounds = bounds_of(run, snapshots)
+        size, depth = np.diff(bounds, axis=1).ravel(), depth_of(bounds)
         limits: dict[str, tuple[float, float]] = {}
         deep = False
         if "spheres" in panels:
@@ -191,13 +188,8 @@ class Stage:
             limits["spheres"] = colours.limits(np.concatenate([values for _, values in shown]), colour)
             largest = max((float(each["radius"].max(initial=0.0)) for each, _ in shown), default=0.0)
             deep = size[depth] > 12.0 * largest
-        if "voidage" in panels:
-            lowest = min(float(run.fluid("voidage", each).min()) for each in snapshots)
-            limits["voidage"] = (min(np.floor(20.0 * lowest) / 20.0, 0.95), 1.0)
-        for name in set(panels) & set(SCALARS):
-            found = np.concatenate([run.fluid(name, each).ravel() for each in snapshots])
-            low, high = float(np.nanmin(found)), float(np.nanmax(found))
-            limits[name] = (low, high if high > low else low + 1.0)
+        for name in set(panels) & {"voidage", *SCALARS}:
+            limits[name] = limits_of_fluid(np.stack([run.fluid(name, each) for each in snapshots]), name)
         if "streamlines" in panels:
             fastest = max(float(colours.magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
             limits["streamlines"] = (0.0, fastest or 1.0)
@@ -372,8 +364,28 @@ def _corners(run: RunData) -> tuple[np.ndarray, np.ndarray]:
     return low, low + np.array(grid.cells) * np.array(grid.spacing)
 
 
+def spread_over(run: RunData, most: int) -> list[int]:
+    """Numbers of the snapshots of a run, or of so many that are spread evenly over it."""
+    count = len(run.times)
+    return sorted(set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist()))
+
+
+def depth_of(bounds: np.ndarray) -> int:
+    """Axis of the line of sight: the shorter one of x and y."""
+    width, depth = np.ptp(bounds[:2], axis=1)
+    return int(width >= depth)
+
+
+def limits_of_fluid(values: np.ndarray, name: str) -> tuple[float, float]:
+    """Values of the first and the last colour of a field of the fluid."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if name == "voidage":
+        return min(float(np.floor(20.0 * low)) / 20.0, 0.95), 1.0
+    return low, high if high > low else low + 1.0
+
+
 def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
-    """The space in view (3, 2) [m]: the grid up to somewhat above the highest bed, or else the particles."""
+    """The space in view (3, 2) [m]: the grid up to somewhat above the highest bed, or else particles and walls."""
     if run.grid is not None:
         low, high = _corners(run)
         heights = run.history.get("bed_height", np.zeros(0))
@@ -390,7 +402,7 @@ def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
     if not np.isfinite(low).all():
         raise InputError("snapshot", list(snapshots), "one with particles", "there is nothing to draw")
     margin = 0.02 * float((high - low).max())
-    return np.stack([low - margin, high + margin], axis=1)
+    return with_walls(np.stack([low - margin, high + margin], axis=1), run)
 
 
 def title_of(run: RunData) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,14 +18,16 @@ from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_text import (
     Report,
     bounds_note,
+    energy_cells,
     film_solution,
+    law_cells,
+    ledger_cells,
     markdown,
     spelled,
     steadiness,
     window,
     with_error,
 )
-from cfddem.analysis.report_values import EnergyLine, KeyResult, LawComparison, Measure
 from cfddem.analysis.run_warnings import NOTE
 from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
 from cfddem.backend.errors import CfddemError, RunFailed
@@ -96,23 +97,22 @@ def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
     """The page as text."""
     case, end, steps = with_files(case_of(run), data), result.window[1], result.steps
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
-    drawn = figures_of(run, case, result)
+    figures = figures_of(run, case, result).items()
     text: str = _template().render(
         result=result,
         status=f"{result.status} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
         film_solution=film_solution(result.film_solution),
         note=NOTE,
-        key_results=_key_results(result.key_results),
-        measures=_measures(result.measures),
-        laws=_laws(result.laws),
-        ledger=[(spelled(name), f"{value:.2g}") for name, value in result.ledger.items()],
-        energy=_energy(result.energy_lines),
+        laws=[(*cells, row.outside_range) for cells, row in zip(law_cells(result), result.laws)],
+        ledger=ledger_cells(result),
+        energy=energy_cells(result),
         preflight=_preflight(result.preflight),
         wall_time=_wall_time(result.wall_time),
         provenance=_provenance(result.provenance),
         case_text=run.case_text,
-        figures={name: (encoded(figure), caption) for name, (figure, caption) in drawn.items()},
+        figures={name: (encoded(figure), caption) for name, (figure, caption) in figures},
+        **{each.__name__: each for each in (with_error, spelled, shown_unit, steadiness)},
     )
     return text
 
@@ -125,48 +125,6 @@ def _template() -> Any:
 
 
 # ---------------------------------------------------------------- tables
-
-
-def _key_results(found: Sequence[KeyResult]) -> list[dict[str, str]]:
-    marks = {True: "good", False: "bad", None: "open"}
-    return [
-        {
-            "name": each.name,
-            "value": with_error(each).replace("+-", "±"),
-            "verdict": each.verdict.replace("+-", "±"),
-            "mark": marks[each.holds],
-        }
-        for each in found
-    ]
-
-
-def _measures(measures: Mapping[str, Measure]) -> list[dict[str, str]]:
-    rows = []
-    for name, each in measures.items():
-        error = "-" if math.isnan(each.error) else f"{each.error:.2g}"
-        rows.append(
-            {
-                "name": spelled(name),
-                "meaning": each.meaning,
-                "mean": f"{each.mean:.4g}",
-                "error": f"at least {error}" if each.error_is_lower_bound and error != "-" else error,
-                "unit": shown_unit(each.unit),
-                "steadiness": steadiness(each),
-            }
-        )
-    return rows
-
-
-def _laws(laws: Sequence[LawComparison]) -> Rows:
-    return [
-        (each.law, f"{each.computed:.4g}", f"{each.expected:.4g}", f"{each.ratio:.3f}",
-         shown_unit(each.unit), each.outside_range)
-        for each in laws
-    ]  # fmt: skip
-
-
-def _energy(lines: Sequence[EnergyLine]) -> Rows:
-    return [(each.group, spelled(each.name), f"{each.energy:.4g}", f"{100.0 * each.fraction:.3f}") for each in lines]
 
 
 def _preflight(made: dict[str, Any]) -> Rows:
@@ -185,19 +143,18 @@ def _wall_time(seconds: dict[str, float]) -> Rows:
 
 
 def _provenance(values: dict[str, Any]) -> Rows:
-    rows: Rows = []
-    for name, each in values.items():
-        if isinstance(each, dict):
-            rows += [(f"{name}: {inner}", _words(value)) for inner, value in each.items()]
-        else:
-            rows.append((name, " ".join(map(str, each)) if isinstance(each, list) else str(each)))
-    return rows
+    tables = {name: each if isinstance(each, dict) else {"": each} for name, each in values.items()}
+    return [
+        (f"{name}: {key}".removesuffix(": "), _words(value))
+        for name, each in tables.items()
+        for key, value in each.items()
+    ]
 
 
 def _words(value: Any) -> str:
-    return (
-        ", ".join(f"{name} {each}" for name, each in value.items() if each) if isinstance(value, dict) else str(value)
-    )
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {each}" for name, each in value.items() if each)
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 # ---------------------------------------------------------------- figures

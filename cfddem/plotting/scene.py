@@ -17,8 +17,8 @@ from cfddem.backend.errors import RunFailed
 from cfddem.io.quantities import declared, shown_unit
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.pictures import SOLID, bounds_of
-from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
+from cfddem.plotting.pictures import SOLID, bounds_of, depth_of, limits_of_fluid, spread_over
+from cfddem.plotting.wall_surfaces import add_walls, walls_of
 
 NOTHING = "none"
 """Choice of a layer or a colour that is not drawn."""
@@ -67,13 +67,10 @@ class Scene:
     def take(self, run: RunData) -> None:
         """Show a run from now on: the same one, read again when it has more snapshots."""
         self.run = run
-        count = len(run.times)
-        self._examined = sorted(set(np.linspace(0, count - 1, min(count, _MOST_EXAMINED)).astype(int).tolist()))
+        self._examined = spread_over(run, _MOST_EXAMINED)
         self._limits: dict[tuple[int, str], tuple[float, float]] = {}
         self.bounds, self._walls = bounds_of(run, self._examined), walls_of(run)
-        self.bounds = with_walls(self.bounds, run) if run.grid is None else self.bounds
-        size = np.diff(self.bounds, axis=1).ravel()
-        self.depth = 0 if size[0] < size[1] else 1
+        self.depth = depth_of(self.bounds)
         for side in (SPHERES, FLUID):
             self.plotter.subplot(0, side)
             axes = self.plotter.show_bounds(
@@ -187,7 +184,8 @@ class Scene:
                 found = [self._fluid(name, each).ravel() for each in self._examined]
             together = np.concatenate(found)
             together = together[np.isfinite(together)]
-            self._limits[side, name] = (_limits_of_fluid if side == FLUID else colours.limits)(together, name)
+            of_fluid = side == FLUID and name != "speed" and together.size
+            self._limits[side, name] = (limits_of_fluid if of_fluid else colours.limits)(together, name)
         return self._limits[side, name]
 
     def _bar(self, side: int, title: str | None) -> dict[str, Any]:
@@ -208,16 +206,6 @@ def _shades_of(layer: str) -> Any:
     if layer == colours.TEMPERATURE:
         return colours.colour_map(layer)
     return _SHADES.get(layer) or colours.part_of("YlGnBu", 0.0, 0.9)
-
-
-def _limits_of_fluid(values: np.ndarray, name: str) -> tuple[float, float]:
-    """Values of the first and the last colour of a fluid field."""
-    if name == "speed" or not values.size:
-        return colours.limits(values, name)
-    if name == "voidage":
-        return min(float(np.floor(20.0 * values.min())) / 20.0, 0.95), 1.0
-    low, high = float(values.min()), float(values.max())
-    return low, high if high > low else low + 1.0
 
 
 # ---------------------------------------------------------------- a window

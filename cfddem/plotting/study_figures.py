@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -164,18 +164,6 @@ def sample_figure(points: Sequence[Point], path: Path) -> bool:
     return True
 
 
-class Sensitive(Protocol):
-    """What the figure needs of a sensitivity."""
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def keys(self) -> list[str]: ...
-    @property
-    def measures(self) -> dict[str, tuple[str, list[dict[str, float]]]]: ...
-    def shown(self) -> list[str]: ...
-
-
 BARS = {
     "sobol": (("first", BLUE, "alone"), ("total", SKY, "with interactions")),
     "morris": (("effect", BLUE, "effect over the whole range"),),
@@ -183,8 +171,11 @@ BARS = {
 """Numbers of a sensitivity that are drawn, with colour and name."""
 
 
-def sensitivity_figure(found: Sensitive, path: Path) -> None:
-    """Draw how much each key matters: a panel for each measure, bars with standard errors for each key."""
+def sensitivity_figure(found: Any, path: Path) -> None:
+    """Draw how much each key matters: a panel for each measure, bars with standard errors for each key.
+
+    found  a `Sensitivity` of `cfddem.studies.sensitivity`
+    """
     names, bars = found.shown(), BARS[found.kind]
     if not names:
         return
@@ -216,22 +207,11 @@ def unit_of(key: str) -> str:
 # ---------------------------------------------------------------- calibration
 
 
-class Found(Protocol):
-    """What the figure needs of a calibration."""
+def calibration_figure(found: Any, path: Path) -> None:
+    """Draw all trials of a calibration, its estimates, and the data.
 
-    @property
-    def variables(self) -> Any: ...
-    @property
-    def data(self) -> Any: ...
-    @property
-    def finished(self) -> Any: ...
-    @property
-    def best(self) -> Any: ...
-    def estimates(self) -> list[dict[str, Any]]: ...
-
-
-def calibration_figure(found: Found, path: Path) -> None:
-    """Write the figure."""
+    found  a `Calibration` of `cfddem.studies.calibration`
+    """
     columns = len(found.variables) + len(found.data)
     rows = -(-columns // 3)
     figure, axes = blank(rows, min(columns, 3), width=3.7 * min(columns, 3), height=3.6 * rows)
@@ -264,7 +244,7 @@ def calibration_figure(found: Found, path: Path) -> None:
     save(figure, path)
 
 
-def _series(panel: Axes, found: Found, data: Points, part: slice) -> None:
+def _series(panel: Axes, found: Any, data: Points, part: slice) -> None:
     """Points in time or height beside all trials."""
     for trial in found.finished:
         panel.plot(data.place, trial.computed[part], color=SKY, alpha=0.35, linewidth=0.8, marker=".", markersize=3)
@@ -278,7 +258,7 @@ def _series(panel: Axes, found: Found, data: Points, part: slice) -> None:
     label(panel, *axis, data.quantity.replace("_", " "), shown_unit(data.unit))
 
 
-def _mean(panel: Axes, found: Found, data: Points, part: slice) -> None:
+def _mean(panel: Axes, found: Any, data: Points, part: slice) -> None:
     """Means of all trials against the key that the data identify best, and the measured ones as bands."""
     shares = [each["error"] / (each["high"] - each["low"]) for each in found.estimates()]
     key = found.variables[int(np.argmin(shares)) if shares else 0]
@@ -350,11 +330,8 @@ def wave_map(folder: str | Path, output: str | Path | None = None) -> Path:
     return output
 
 
-def draw_map(axes: object, found: LayerMap, wave: Waves, window: tuple[float, float], title: str = "") -> None:
+def draw_map(axes: Axes, found: LayerMap, wave: Waves, window: tuple[float, float], title: str = "") -> None:
     """Solid fraction over time and height; a line shows the speed of the waves."""
-    from matplotlib.axes import Axes
-
-    assert isinstance(axes, Axes)
     top = 1e3 * float(found.height[found.solid_fraction.max(axis=0) > 0.02].max(initial=found.height[0]))
     shades = axes.pcolormesh(
         found.time, 1e3 * found.height, found.solid_fraction.T, cmap="Blues", vmin=0.0,
@@ -374,11 +351,8 @@ def draw_map(axes: object, found: LayerMap, wave: Waves, window: tuple[float, fl
     axes.grid(False)
 
 
-def draw_impacts(axes: object, found: Impacts, granular_temperature: float | None = None) -> None:
+def draw_impacts(axes: Axes, found: Impacts, granular_temperature: float | None = None) -> None:
     """Distribution of the speeds of impact, and that of a Maxwellian gas with the granular temperature."""
-    from matplotlib.axes import Axes
-
-    assert isinstance(axes, Axes)
     axes.stairs(found.density, found.edges, color=BLUE, fill=True, alpha=0.4, label="run")
     if granular_temperature:
         speed = np.linspace(0.0, found.edges[-1], 200)

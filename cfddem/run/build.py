@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.case.bed import Jet
+from cfddem.case.bed import Jet, at_times
 from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.liquid import Bond
 from cfddem.case.materials import pair_overrides
@@ -306,8 +306,7 @@ def _inlet(case: Case) -> list[Condition]:
     if isinstance(velocity, float):
         inlets: list[Condition] = [Inlet(velocity, where=within())]
     else:
-        times, speeds = np.array(velocity).T
-        inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)), where=within())]
+        inlets = [Inlet(1.0, in_time=lambda t: float(at_times(velocity, t)), where=within())]
     return [*inlets, *(Inlet(jet.velocity, where=within(_hole(jet, case.column))) for jet in case.bed.jets)]
 
 

@@ -21,32 +21,29 @@ from scenarios.validation.table import Progress, replacing
 
 def finished(case: Case, folder: Path, name: str, progress: Progress, changes: dict[str, Any]) -> RunData:
     """The finished run of a case with changes, in its folder; runs or continues it where needed."""
-    home = folder / name
-
-    def live(status: Status) -> None:
-        progress(f"{name}: {status.time:.3g} of {status.end:g} s")
-
-    if not (home / "run.json").exists():
-        Run.begin(case.with_(**changes), home, report=live, progress=progress).go()
-    elif open_run(home).status != "finished":
-        Run.resume(home, report=live, progress=progress).go()
-    return open_run(home)
+    return _continued(case.with_(**changes), folder / name, progress)
 
 
 def advanced(case: Case, folder: Path, name: str, progress: Progress, until: float) -> None:
     """Advance the run of a case in its folder to a time [s]; nothing if it is there. A later time continues it."""
-    home = folder / name
+    _continued(case.with_(**{"run.until": until}), folder / name, progress, until)
+
+
+def _continued(case: Case, home: Path, progress: Progress, until: float = 0.0) -> RunData:
+    """A run in its folder, finished, and gone on to a time [s]."""
 
     def live(status: Status) -> None:
-        progress(f"{name}: {status.time:.3g} of {status.end:g} s")
+        progress(f"{home.name}: {status.time:.3g} of {status.end:g} s")
 
     if not (home / "run.json").exists():
-        Run.begin(case.with_(**{"run.until": until}), home, report=live, progress=progress).go()
-        return
+        Run.begin(case, home, report=live, progress=progress).go()
+        return open_run(home)
     run = open_run(home)
     reached = max(run.times.tolist(), default=0.0)
     if run.status != "finished" or reached < until * (1.0 - 1e-9):
-        Run.resume(home, until=max(until, reached), report=live, progress=progress).go()
+        end = max(until, reached) if until else None
+        Run.resume(home, until=end, report=live, progress=progress).go()
+    return open_run(home)
 
 
 @contextmanager

@@ -11,9 +11,8 @@ import pytest
 from example_case import TEXT
 
 from cfddem.backend.errors import InputError
-from cfddem.case.absent import KEYS
 from cfddem.case.gallery import gallery_files, overrides
-from cfddem.case.input_errors import InputErrors, sections_of
+from cfddem.case.input_errors import InputErrors
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
 from cfddem.preflight.summary import preflight
@@ -104,32 +103,6 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
     message = str(refused(TEXT, given))
     assert said in message
     assert "\n" not in message
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("drag =", "own_wind = true\ndrag =", "laws.own_wind: must be written as laws.self_disturbance_correction;"),
-        ("seed = 1", 'start = "at"', "bed.start = 'at': must be written as 'placed'; the value has been renamed"),
-        ("every = 0.05", "step = 1e-5", "run.step: must be written as run.particle_step; the key has been renamed"),
-    ],
-    ids=["own_wind", "at", "step"],
-)
-def test_a_renamed_key_or_value_is_refused_in_one_line_with_the_new_one(old: str, new: str, message: str) -> None:
-    text = TEXT.replace(old, new)
-    line = 1 + next(k for k, each in enumerate(text.split("\n")) if each.startswith(new.split("\n")[0]))
-    assert str(refused(text)).startswith(f"bed.toml:{line}: {message}")
-
-
-def test_every_renamed_key_leads_to_a_valid_one() -> None:
-    for old, new in KEYS.items():
-        table, name, *_ = new.split(".")
-        section = sections_of(Case.model_fields[table])[0]
-        assert name in section.model_fields and old.split(".")[1] not in section.model_fields
-        with pytest.raises(InputError, match=f"must be written as {new}; the key has been renamed"):
-            Case.from_text(TEXT, "bed.toml", {old: 1.0})
-    with pytest.raises(InputError, match="written as self_disturbance_correction"):
-        overrides(["own_wind=true"])
 
 
 @pytest.mark.parametrize(

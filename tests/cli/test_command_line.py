@@ -40,7 +40,6 @@ from cfddem.cli.app import main
         ("collid --stokes 30", ["collid"]),
         ("check liquid-bed --set roughness=1e-6", ["roughness", "material.NAME.roughness"]),
         ("check liquid-bed --set inlet_velocity=-0.1", ["bed.inlet_velocity = -0.1", "at least 0"]),
-        ("check liquid-bed --set own_wind=false", ["own_wind", "self_disturbance_correction", "renamed"]),
         ("explain di_felice --plot nowhere/a.png", ["output = 'nowhere/a.png'", "create nowhere first"]),
         ("view . --movie nowhere/a.gif", ["output = 'nowhere/a.gif'", "create nowhere first"]),
         ("validate binary-colision", ["target", "binary-colision", "did you mean 'binary-collision'"]),

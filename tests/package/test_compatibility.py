@@ -5,13 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
 from command_line import call
 
 import cfddem
 from cfddem.backend.errors import CfddemError, InputError, RunFailed, RunStopped
-from cfddem.case.absent import KEYS
-from cfddem.case.schema import Case
 from cfddem.cli.app import app
 from cfddem.preflight.summary import PreflightError
 
@@ -40,10 +37,3 @@ def test_commands_end_with_these_codes(tmp_path: Path) -> None:
     assert call("check", "liquid-bed", "--set", "bed.diameter=1").code == 2
     assert call("report", str(tmp_path)).code == 2
     assert call("check", "--no-such-option").code == 2
-
-
-@pytest.mark.parametrize("key", [key for key in KEYS if key.partition(".")[0] in ("bed", "run", "laws")])
-def test_a_renamed_key_is_refused_with_its_new_name(key: str) -> None:
-    with pytest.raises(InputError) as refused:
-        Case.from_text("", overrides={key: 1.0})
-    assert KEYS[key] in str(refused.value)

@@ -26,7 +26,6 @@ from cfddem.plotting.curves import history
 from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
 from cfddem.plotting.scene import Look, Scene, scene, window
 from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
-from scenarios.beds.liquid_bed.study import side_by_side
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
 QUANTITIES = {
@@ -113,7 +112,6 @@ def test_agglomerates_have_a_colour_each_and_single_spheres_none():
 
 def test_picture_movie_and_window(renders, bed, tmp_path):
     import matplotlib.image
-    from PIL import Image
 
     path = picture(bed, tmp_path / "bed.png", show=("spheres", "voidage", "bubbles", "streamlines"))
     image = matplotlib.image.imread(path)
@@ -124,16 +122,6 @@ def test_picture_movie_and_window(renders, bed, tmp_path):
     plotter = scene(open_run(bed), off_screen=True)
     assert plotter.screenshot(return_img=True).std() > 1.0
     plotter.close()
-
-
-def test_beds_side_by_side(bed, tmp_path):
-    """The movie has a frame for each snapshot, and both beds are drawn."""
-    side_by_side({"one": bed, "other": bed}, tmp_path / "beds.gif")
-    with Image.open(tmp_path / "beds.gif") as drawn:
-        assert drawn.n_frames == len(open_run(bed).times)
-        frame = np.asarray(drawn.convert("L"))
-    half = frame.shape[1] // 2
-    assert (frame[:, :half] < 128).any() and (frame[:, half:] < 128).any()
 
 
 def test_a_film_as_mp4(renders, bed, tmp_path):

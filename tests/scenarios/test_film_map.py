@@ -16,7 +16,7 @@ from cfddem.preflight.summary import preflight
 from scenarios.validation.film_map import study
 from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, is_corner, plan, points, stokes_of
 from scenarios.validation.film_map.effects import Beds, Estimate, change, compared, mean, read_beds, write_beds
-from scenarios.validation.film_map.figure import draw
+from scenarios.validation.film_map.study import draw
 
 sys.path.insert(0, str(HOME / "docs" / "tools"))
 import film_map as page

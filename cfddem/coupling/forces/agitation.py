@@ -33,7 +33,7 @@ from cfddem.backend.counter_random import normal_numbers
 from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.sampled_flow import SampledFlow, Seen
 from cfddem.coupling.terms import CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -53,6 +53,14 @@ class Neighbourhood(NamedTuple):
     mean_slip: Array  # mean over the neighbourhood, weighted by volume (N, 3) [m/s]
     conductance: Array  # drag over slip (N,) [kg/s]
     solid: Array  # solid fraction of the cells (nz, ny, nx)
+
+
+class Draws(NamedTuple):
+    """What the random numbers of a step follow from."""
+
+    names: Array  # ids of the particles (N,)
+    seed: int
+    step: int  # number of the step
 
 
 class AgitationTerms(NamedTuple):
@@ -102,6 +110,17 @@ class Agitation(FluidForce):
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """What a model adds to the coming fluid step [s]."""
         raise NotImplementedError
+
+    def _draws(self, particles: Particles) -> Draws:
+        """What the random numbers of the step follow from; the next step has others."""
+        self.steps += 1
+        return Draws(particles.id, self.seed, self.steps - 1)
+
+    def _seen(self, particles: Particles, around: Neighbourhood) -> Seen:
+        """The fluid around the particles, with the mean slip."""
+        return Seen(
+            around.mean_slip, around.flow.voidage, particles.radius, particles.viscosity, float(self.fluid.density)
+        )
 
 
 def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: Array, values: Array) -> Array:
@@ -179,20 +198,15 @@ class PseudoTurbulence(Agitation):
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """Fluctuation and force in the coming fluid step [s]."""
-        flow, density = around.flow, self.fluid.density
-        seen = np.empty((2, particles.count, 3))  # in the drag, and without the factors of the drag
-        shares = np.array(self.factors[:2])
-        counter = np.array([self.seed, self.steps])
+        fluctuation = np.empty((2, particles.count, 3))  # in the drag, and without the factors of the drag
         self.outside += int(
             self._loop(
-                particles[PROCESS.name], particles.id, around.mean_slip, flow.voidage, particles.radius,
-                particles.viscosity, particles.density / density, density, shares, self.factors.time, step, counter,
-                self._ranges, seen,
+                particles[PROCESS.name], self._draws(particles), self._seen(particles, around),
+                particles.density / self.fluid.density, self.factors, step, self._ranges, fluctuation,
             )
         )  # fmt: skip
-        self.steps += 1
-        velocity = without_mean(self.kernel, around.cell_map, around.conductance, seen[0])
-        return AgitationTerms(velocity, self._inertial_force(particles, around, seen[1], step))
+        velocity = without_mean(self.kernel, around.cell_map, around.conductance, fluctuation[0])
+        return AgitationTerms(velocity, self._inertial_force(particles, around, fluctuation[1], step))
 
     def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array:
         """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
@@ -235,15 +249,12 @@ class FluctuatingForce(Agitation):
         mean = neighbourhood_mean(self.kernel, around.cell_map, around.solid, moments)
         speed = (mean[:, :3] ** 2).sum(axis=1)  # local: components of a row
         temperature, force = np.maximum(mean[:, 3] - speed, 0.0) / 3.0, np.empty_like(velocity)
-        shares, counter = np.array(self.factors[:2]), np.array([self.seed, self.steps])
         self.outside += int(
             _fluctuate_force(
-                particles[FORCE_PROCESS.name], particles.id, around.mean_slip, around.flow.voidage, temperature,
-                particles.radius, particles.viscosity, self.fluid.density, shares, step / self.factors.time, counter,
-                self._range, force,
+                particles[FORCE_PROCESS.name], self._draws(particles), self._seen(particles, around), temperature,
+                self.factors, step / self.factors.time, self._range, force,
             )
         )  # fmt: skip
-        self.steps += 1
         free = volume * (particles.inverse_mass > 0.0)  # fixed particles get no force and are left out of the mean
         acceleration = without_mean(self.kernel, around.cell_map, free, force / volume[:, None])
         return AgitationTerms(np.zeros_like(force), free[:, None] * acceleration)
@@ -284,8 +295,9 @@ def _advanced(value, rate, transition, first, second):
 
 
 @inline
-def _slip_numbers(slip, n, voidage, radius, viscosity, density):
+def _slip_numbers(seen, n):
     """Size of the mean slip, its direction, and its Reynolds number."""
+    slip, voidage, radius, viscosity, density = seen
     size = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
     inverse = 1.0 / max(size, 1e-300)
     direction = (slip[n, 0] * inverse, slip[n, 1] * inverse, slip[n, 2] * inverse)
@@ -299,26 +311,24 @@ def _along(process, n, direction):
 
 
 @threaded
-def _fluctuate(
-    process, names, slip, voidage, radius, viscosity, ratio, density, shares, time_share, step, counter, ranges, seen
-):
+def _fluctuate(process, draws, seen, ratio, factors, step, ranges, fluctuation):
     """Advance the process of every particle and give it the variance of the law; returns how many are out of range.
 
-    ratio    density of the particle over that of the fluid
-    counter  seed, and number of the step
-    ranges   of the law, low and high of each argument (4, 2)
-    seen     fluctuation with the factors of the drag, and without them (2, N, 3)
+    ratio        density of the particle over that of the fluid
+    ranges       of the law, low and high of each argument (4, 2)
+    fluctuation  with the factors of the drag, and without them (2, N, 3)
     """
+    names, radius, voidage = draws.names, seen.radius, seen.voidage
     outside = 0
     for n in prange(len(names)):
-        a, b, c, d = normal_numbers(counter[0], names[n], counter[1], 0)
-        e, f, _, _ = normal_numbers(counter[0], names[n], counter[1], 1)
-        size, direction, reynolds = _slip_numbers(slip, n, voidage, radius, viscosity, density)
+        a, b, c, d = normal_numbers(draws.seed, names[n], draws.step, 0)
+        e, f, _, _ = normal_numbers(draws.seed, names[n], draws.step, 1)
+        size, direction, reynolds = _slip_numbers(seen, n)
         if math.isnan(process[n, 0]):
             process[n, 0], process[n, 1], process[n, 2] = a, b, c
             process[n, 3], process[n, 4], process[n, 5] = d, e, f
         elif size > 0.0:
-            time = time_share * 2.0 * radius[n] / size
+            time = factors.time * 2.0 * radius[n] / size
             steps = _transition((1.0 - SHORT) * time, SHORT * time, step)
             process[n, 0], process[n, 3] = _advanced(process[n, 0], process[n, 3], steps, a, b)
             process[n, 1], process[n, 4] = _advanced(process[n, 1], process[n, 4], steps, c, d)
@@ -330,26 +340,25 @@ def _fluctuate(
         for k in range(3):
             parallel = along * part * direction[k]
             normal = across * (process[n, k] - part * direction[k])
-            seen[0, n, k] = shares[0] * parallel + shares[1] * normal
-            seen[1, n, k] = parallel + normal
+            fluctuation[0, n, k] = factors.along * parallel + factors.across * normal
+            fluctuation[1, n, k] = parallel + normal
         beyond = solid < ranges[0, 0] or solid > ranges[0, 1] or reynolds < ranges[1, 0] or reynolds > ranges[1, 1]
         outside += 1 if beyond or ratio[n] < ranges[3, 0] or ratio[n] > ranges[3, 1] else 0
     return outside
 
 
 @threaded
-def _fluctuate_force(
-    process, names, slip, voidage, temperature, radius, viscosity, density, shares, step, counter, fitted, force
-):
+def _fluctuate_force(process, draws, seen, temperature, factors, step, fitted, force):
     """Advance the process of every particle, exactly for a constant rate, and give it the deviation of the force.
 
     returns  how many are out of the range of solid fractions that the law is fitted to
     """
+    names, voidage, viscosity = draws.names, seen.voidage, seen.viscosity
     outside = 0
     for n in prange(len(names)):
-        a, b, c, _ = normal_numbers(counter[0], names[n], counter[1], 0)
-        size, direction, reynolds = _slip_numbers(slip, n, voidage, radius, viscosity, density)
-        solid, diameter = 1.0 - voidage[n], 2.0 * radius[n]
+        a, b, c, _ = normal_numbers(draws.seed, names[n], draws.step, 0)
+        size, direction, reynolds = _slip_numbers(seen, n)
+        solid, diameter = 1.0 - voidage[n], 2.0 * seen.radius[n]
         kept = 0.0
         if not math.isnan(process[n, 0]):
             kept = math.exp(-step * force_rate(solid, diameter, temperature[n]))
@@ -364,6 +373,6 @@ def _fluctuate_force(
         part = _along(process, n, direction)
         for k in range(3):
             normal = process[n, k] - part * direction[k]
-            force[n, k] = deviation * (shares[0] * part * direction[k] + shares[1] * normal)
+            force[n, k] = deviation * (factors.along * part * direction[k] + factors.across * normal)
         outside += 1 if solid < fitted[0] or solid > fitted[1] else 0
     return outside

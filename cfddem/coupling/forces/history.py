@@ -32,7 +32,7 @@ from cfddem.backend.compile import inline
 from cfddem.backend.law_set import specialise
 from cfddem.coupling.forces import history_modes
 from cfddem.coupling.forces.history_modes import Memory, columns, exponentials
-from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.sampled_flow import SampledFlow, Seen
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -131,12 +131,10 @@ class History(FluidForce):
         if len(self._terms.factor) != particles.count:
             self._terms = _room(particles.count)
         terms = self._terms
-        self._advance(
-            flow.slip, drag, inertia, particles.radius, particles.viscosity,
-            flow.voidage if self.model == "B" else flow.voidage[:0], float(self.density), self._kernel,
-            float(step), float(last_step),
-            Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms),
-        )  # fmt: skip
+        voidage = flow.voidage if self.model == "B" else flow.voidage[:0]
+        seen = Seen(flow.slip, voidage, particles.radius, particles.viscosity, float(self.density))
+        memory = Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms)
+        self._advance(seen, drag, inertia, self._kernel, float(step), float(last_step), memory)
         return terms
 
     def store(self, particles: Particles, implicit: Array, terms: HistoryTerms, step: float) -> None:

@@ -178,14 +178,15 @@ PIECE = 512
 
 
 @threaded
-def advance(slip, drag, inertia, radius, viscosity, voidage, density, kernel, step, last_step, memory):
+def advance(seen, drag, inertia, kernel, step, last_step, memory):
     """Advance the memory of every particle over the last step, and find its force in the coming one.
 
+    seen     by the inverse of whose voidage the force is larger
     drag     conductance (N,) [kg/s]
     inertia  (N,) [kg]
-    voidage  by whose inverse the force is larger; empty for 1
     memory   `Memory`, all of it filled but `newest`
     """
+    slip, voidage, radius, viscosity, density = seen
     count = len(radius)
     for piece in prange((count + PIECE - 1) // PIECE):
         begin, end = piece * PIECE, min((piece + 1) * PIECE, count)

@@ -89,7 +89,7 @@ class Level:
         # A coefficient falls with the distance that it spans: to the next cell, or to the side with a known pressure.
         farther = fine.factors[fine.outlets].min(initial=2)  # local: three directions
         coupled = np.array(whole[::-1]) > 1  # a single cell is its own periodic neighbour
-        self.loop(coarsen)(*of_fine, fine.factors, farther, coupled, *of_coarse)
+        self.loop(coarsen)(tuple(of_fine), fine.factors, farther, coupled, tuple(of_coarse))
 
     def take_diagonal(self) -> None:
         """Compute the diagonal and its inverse, zero in solid cells."""
@@ -105,8 +105,8 @@ class Level:
 
     def relax(self, colour: int, halves: int, backward: bool) -> None:
         """Make so many halves of sweeps, beginning with a colour."""
-        system = self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows[0]
-        self.loop(smooth)(*system, colour, halves, backward)
+        matrix = self.ax, self.ay, self.az, self.inverse
+        self.loop(smooth)(self.x, self.b, matrix, self.rows[0], colour, halves, backward)
 
     def take_residual(self) -> None:
         """Compute the residual."""

@@ -19,31 +19,39 @@ def _cells_in(coarse, factor, shift, count):
 
 
 @threaded
-def coarsen(ax, ay, az, anchor, factors, farther, coupled, coarse_ax, coarse_ay, coarse_az, coarse_anchor):
+def coarsen(fine, factors, farther, coupled, coarse):
     """Coefficients and anchors of coarse cells: sums of the fine ones, divided by how much farther they reach.
 
+    fine, coarse  coefficients along x, y, z, and anchors
     farther  how much the side with a known pressure is away, in fine cells
     coupled  (3,) whether there are several coarse cells along x, y, z
     """
+    for kc in prange(coarse[0].shape[0]):
+        _coarsen_plane(kc, fine, factors, farther, coupled, coarse)
+
+
+@inline
+def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
+    """`coarsen` in one plane."""
+    (ax, ay, az, anchor), (coarse_ax, coarse_ay, coarse_az, coarse_anchor) = fine, coarse
     nz, ny, nx = ax.shape
-    for kc in prange(coarse_ax.shape[0]):
-        first_plane, end_plane = _cells_in(kc, factors[2], 0, nz)
-        for jc in range(coarse_ax.shape[1]):
-            first_row, end_row = _cells_in(jc, factors[1], 0, ny)
-            for ic in range(coarse_ax.shape[2]):
-                first, end = _cells_in(ic, factors[0], 0, nx)
-                west = south = below = held = 0.0
-                for k in range(first_plane, end_plane):
-                    for j in range(first_row, end_row):
-                        west += ax[k, j, first]
-                        for i in range(first, end):
-                            south += ay[k, j, i] if j == first_row else 0.0
-                            below += az[k, j, i] if k == first_plane else 0.0
-                            held += anchor[k, j, i]
-                coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
-                coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
-                coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
-                coarse_anchor[kc, jc, ic] = held / farther
+    first_plane, end_plane = _cells_in(kc, factors[2], 0, nz)
+    for jc in range(coarse_ax.shape[1]):
+        first_row, end_row = _cells_in(jc, factors[1], 0, ny)
+        for ic in range(coarse_ax.shape[2]):
+            first, end = _cells_in(ic, factors[0], 0, nx)
+            west = south = below = held = 0.0
+            for k in range(first_plane, end_plane):
+                for j in range(first_row, end_row):
+                    west += ax[k, j, first]
+                    for i in range(first, end):
+                        south += ay[k, j, i] if j == first_row else 0.0
+                        below += az[k, j, i] if k == first_plane else 0.0
+                        held += anchor[k, j, i]
+            coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
+            coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
+            coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
+            coarse_anchor[kc, jc, ic] = held / farther
 
 
 @threaded
@@ -63,8 +71,9 @@ def take_diagonal(ax, ay, az, anchor, diagonal, inverse):
 
 
 @vector_inline
-def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
+def _relax_plane(k, colour, backward, x, b, matrix, new):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
+    ax, ay, az, inverse = matrix
     nz, ny, nx = x.shape
     below, above = neighbours(k, nz)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
@@ -91,9 +100,10 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
 
 
 @threaded
-def smooth(x, b, ax, ay, az, inverse, rows, first, halves, backward):
+def smooth(x, b, matrix, rows, first, halves, backward):
     """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten.
 
+    matrix  coefficients along x, y, z, and the inverse of the diagonal
     first   colour of the first half of a sweep
     halves  number of halves, of both colours in turn
     """
@@ -106,7 +116,7 @@ def smooth(x, b, ax, ay, az, inverse, rows, first, halves, backward):
             begin, end = (together, nz) if alone else (0, together)
             if begin < end:
                 for k in prange(begin, end):
-                    _relax_plane(k, first + half, backward, x, b, ax, ay, az, inverse, rows[k])
+                    _relax_plane(k, first + half, backward, x, b, matrix, rows[k])
 
 
 @vector_inline

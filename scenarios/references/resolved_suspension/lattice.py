@@ -151,8 +151,13 @@ def _mix(m, c, weight, target, force, even_rate, odd_rate, count):  # type: igno
 
 
 @inline
-def _relax(there, back, w, cu, cs, cp, cf, even_kept, odd_kept, fluid, solid, both, common):  # type: ignore[no-untyped-def]
-    """Both populations of a pair of opposite directions after the collision, from the velocities along it."""
+def _relax(there, back, w, along, parts):  # type: ignore[no-untyped-def]
+    """Both populations of a pair of opposite directions after the collision.
+
+    along  velocities of fluid and solid, momentum and force along the pair
+    parts  of the collision in the cell, see `_mix`
+    """
+    (cu, cs, cp, cf), (even_kept, odd_kept, fluid, solid, both, common) = along, parts
     even = 0.5 * even_kept * (there + back)
     even += w * (common + 4.5 * (cu * (fluid * cu + both * cf) + solid * cs * cs))
     odd = 0.5 * odd_kept * (there - back) + 3.0 * w * cp
@@ -166,8 +171,8 @@ def _along(f, i, m, c, axis, push):  # type: ignore[no-untyped-def]
     even_kept, odd_kept, fluid, solid, both, common = c[0], c[1], c[2], c[3], c[4], c[5]
     for x in range(CHUNK):
         there[x], back[x] = _relax(
-            there[x], back[x], 1.0 / 18.0, u[x], s[x], p[x], push,
-            even_kept[x], odd_kept[x], fluid[x], solid[x], both[x], common[x],
+            there[x], back[x], 1.0 / 18.0, (u[x], s[x], p[x], push),
+            (even_kept[x], odd_kept[x], fluid[x], solid[x], both[x], common[x]),
         )  # fmt: skip
 
 
@@ -179,8 +184,8 @@ def _across(f, i, m, c, axis, other, sign, push):  # type: ignore[no-untyped-def
     even_kept, odd_kept, fluid, solid, both, common = c[0], c[1], c[2], c[3], c[4], c[5]
     for x in range(CHUNK):
         there[x], back[x] = _relax(
-            there[x], back[x], 1.0 / 36.0, u[x] + sign * v[x], s[x] + sign * t[x], p[x] + sign * q[x], push,
-            even_kept[x], odd_kept[x], fluid[x], solid[x], both[x], common[x],
+            there[x], back[x], 1.0 / 36.0, (u[x] + sign * v[x], s[x] + sign * t[x], p[x] + sign * q[x], push),
+            (even_kept[x], odd_kept[x], fluid[x], solid[x], both[x], common[x]),
         )  # fmt: skip
 
 
