@@ -79,6 +79,8 @@ def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"Reynolds number at {'inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes, "", "Archimedes number")
+    if surface := case.surface_in_words:
+        yield Row(group, "surface of the bed", math.nan, "", surface)
     if case.bed.fixed:
         return
     law = bed_drag(case).__name__
