@@ -159,7 +159,7 @@ def bounds_note(result: Report) -> list[str]:
 def _headline(result: Report) -> Iterator[str]:
     reason = f", {result.message}" if result.status == "finished" and result.message else ""
     yield f"{result.case}: {result.status}{reason}"
-    yield window(result)
+    yield from textwrap.wrap(window(result), WIDTH, subsequent_indent="  ")
     yield from bounds_note(result)
 
 
