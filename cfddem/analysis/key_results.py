@@ -186,7 +186,7 @@ def _drop(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawCompari
 
 def _shallow(case: Case, measures: Mapping[str, Measure]) -> str:
     """What a smeared surface does to the pressure drop of a packed bed of few cells, in words; empty for others."""
-    if case.laws.surface == "sharp" or "bed_height" not in measures or case.bed.start == "packed":
+    if case.surface == "sharp" or "bed_height" not in measures or case.bed.start == "packed":
         return ""
     bed, count = _bed_at_end(case, measures["bed_height"]), cell_counts(case.column.size, case.column.cell)[2]
     cells = measures["bed_height"].mean / case.column.height * count

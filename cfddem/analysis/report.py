@@ -59,6 +59,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         message=run.message,
         window=(begin, end),
         films="" if case.bed.fixed else case.laws.film_in_words(case.around),
+        surface=case.surface_in_words,
         key_results=key_results(run, case, measures, laws, STATE in actions),
         measures=measures,
         measured=[each.score() for each in compared_with_measured(run, case, begin)],

@@ -34,6 +34,7 @@ class Report:
 
     window        start and end of the averaging window [s]
     films         lubrication films, in words
+    surface       what particles at the surface of the bed see, in words
     key_results   most important first
     measures      by name
     measured      scores against measured data
@@ -55,6 +56,7 @@ class Report:
     message: str
     window: tuple[float, float]
     films: str
+    surface: str
     key_results: list[KeyResult]
     measures: dict[str, Measure]
     measured: list[dict[str, Any]]
@@ -184,9 +186,10 @@ def with_error(row: KeyResult | Measure) -> str:
 
 
 def window(result: Report) -> str:
-    """The averaging window and the lubrication films of a run in words."""
+    """The averaging window, the lubrication films and the surface of the bed of a run in words."""
     begin, end = result.window
-    return f"means from {begin:g} to {end:g} s" + f"; lubrication films: {result.films}" * bool(result.films)
+    said = (("lubrication films", result.films), ("surface of the bed", result.surface))
+    return "; ".join([f"means from {begin:g} to {end:g} s", *(f"{name}: {words}" for name, words in said if words)])
 
 
 def bounds_note(result: Report) -> list[str]:
@@ -198,7 +201,7 @@ def bounds_note(result: Report) -> list[str]:
 def _headline(result: Report) -> Iterator[str]:
     reason = f", {result.message}" if result.status == "finished" and result.message else ""
     yield f"{result.case}: {result.status}{reason}"
-    yield window(result)
+    yield from textwrap.wrap(window(result), WIDTH, subsequent_indent="  ")
     yield from bounds_note(result)
 
 

@@ -103,10 +103,10 @@ class CaseLaws(Checked):
         ge=0,
         description="standard deviation of the filter kernel over the mean diameter of the species of a particle [-]",
     )
-    surface: Literal["smeared", "sharp"] = Field(
-        "smeared",
-        description="what particles at the surface of a bed see: smeared by the kernel, or sharp, the suspension that "
-        "they belong to; model A only",
+    surface: Literal["auto", "smeared", "sharp"] = Field(
+        "auto",
+        description="what particles at the surface of a bed see: smeared by the kernel; sharp, the suspension that "
+        "they belong to, in model A; or auto (sharp where agitation acts, else smeared)",
     )
     self_disturbance_correction: bool = Field(
         True, description="remove the disturbance that each particle causes at its own position from the sampled flow"

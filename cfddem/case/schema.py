@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError, model_validator
 
@@ -191,6 +191,33 @@ class Case(CaseTables):
         if given == "auto" or "agitation" in self.laws.missing:
             return law_of(free_spheres) if given == "auto" and self._agitation_is_measured else "none"
         return given if isinstance(given, str) and given in BUILT_IN["agitation"] else chosen("agitation", given)
+
+    @property
+    def surface(self) -> Literal["smeared", "sharp"]:
+        """What particles at the surface of a bed see.
+
+        `laws.surface = "auto"` is sharp where a law of agitation acts, in model A, and smeared otherwise: without
+        agitation, beds break into plugs more with sharp surfaces.
+        """
+        laws = self.laws
+        if laws.surface != "auto":
+            return laws.surface
+        return "sharp" if self.agitation != "none" and laws.model == "A" and laws.drag_law is not None else "smeared"
+
+    @property
+    def surface_in_words(self) -> str:
+        """What particles at the surface of a bed see, and why; empty for one sphere, and where nothing resists it.
+
+        A smeared surface in a gas is not worth a word either: agitation acts in liquids only.
+        """
+        if not self.resists or self.is_one_sphere or not (self.in_liquid or self.surface == "sharp"):
+            return ""
+        if self.laws.surface != "auto":
+            return self.surface
+        if self.surface == "sharp":
+            return "sharp, the default where agitation acts"
+        acts = self.agitation != "none"
+        return "smeared, the default " + ("in model B" if acts and self.laws.model == "B" else "without agitation")
 
     @property
     def agitation_factors(self) -> AgitationFactors:

@@ -15,6 +15,7 @@ from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
+from cfddem.preflight.accuracy import accuracy
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.issue import WIDTH
@@ -62,6 +63,7 @@ def overview(
         *_equipment(case, bed),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),
+        *(Row("accuracy, where it was measured", *each) for each in accuracy(case, bed, steps)),
         *_cost(cost),
     )
 
@@ -79,6 +81,8 @@ def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"Reynolds number at {'inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes, "", "Archimedes number")
+    if surface := case.surface_in_words:
+        yield Row(group, "surface of the bed", math.nan, "", surface)
     if case.bed.fixed:
         return
     law = bed_drag(case).__name__

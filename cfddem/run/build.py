@@ -339,7 +339,7 @@ def forces_of(
     if laws.lift:
         forces.append(Lift(fluid, kernel))
     if laws.drag_law:
-        forces.append(Drag(laws.drag_law, fluid.model, kernel if laws.surface == "sharp" else None))
+        forces.append(Drag(laws.drag_law, fluid.model, kernel if case.surface == "sharp" else None))
     forces += [*agitation_of(case, fluid, kernel, *added_mass), *beside, *added_mass]
     if laws.history != "none":
         forces.append(History(laws.history, fluid.density, fluid.model))

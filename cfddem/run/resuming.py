@@ -113,8 +113,8 @@ CHANGEABLE = (
         "youngs_modulus", "contact_modulus", "poisson", "restitution", "friction", "rolling_friction",
         "friction_lubricated", "roughness",
     )),
-    "laws.drag", "laws.agitation", "laws.gravity", "laws.lift", "laws.torque", "laws.viscous_stress", "laws.convection",
-    "laws.contact_parameters.*",
+    "laws.drag", "laws.agitation", "laws.surface", "laws.gravity", "laws.lift", "laws.torque", "laws.viscous_stress",
+    "laws.convection", "laws.contact_parameters.*",
 )  # fmt: skip
 """Keys whose values the state of a run does not hold, or holds in a field that is made anew."""
 
@@ -135,10 +135,12 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
             others = ", ".join(each for each in CHANGEABLE if each.startswith(f"{key.split('.')[0]}."))
             remedy = f"of this table, {others} can change" if others else "run the changed case from its beginning"
             raise InputError(key, None, f"left as it is in {origin}, whose state depends on it", remedy)
-    was, now = (each.agitation if isinstance(each.agitation, str) else each.agitation.name for each in (before, case))
-    if was != now:
-        limit = f"{was!r}, as in {origin}"
-        raise InputError("laws.agitation", now, limit, f"name it where it is auto: --set laws.agitation={was}")
+    for key in ("agitation", "surface"):
+        chosen = [getattr(each, key) for each in (before, case)]
+        was, now = (each if isinstance(each, str) else each.name for each in chosen)
+        if was != now:
+            limit, key = f"{was!r}, as in {origin}", f"laws.{key}"
+            raise InputError(key, now, limit, f"name it where it is auto: --set {key}={was}")
     try:
         time = float(state["time"])
         if case.run.until > time:

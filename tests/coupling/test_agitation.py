@@ -47,6 +47,7 @@ drag = "wen_yu"
 lubrication = "none"
 self_disturbance_correction = false
 agitation = "pseudo_turbulence"
+surface = "smeared"
 
 [run]
 until = 0.1

@@ -50,7 +50,9 @@ def case_of(text: str, **changes: Any) -> Case:
     return Case.from_text(text, "case", {name.replace("__", "."): value for name, value in changes.items()})
 
 
-ALL_FORCES = {f"laws__{name}": True for name in ("lift", "torque", "viscous_stress")}
+ALL_FORCES: dict[str, Any] = {
+    **{f"laws__{name}": True for name in ("lift", "torque", "viscous_stress")}, "laws__surface": "smeared",
+}  # fmt: skip
 
 BEDS = {
     "all forces": case_of(
@@ -161,7 +163,8 @@ def test_sums_in_the_order_of_the_ranks_differ(monkeypatch: pytest.MonkeyPatch) 
 TALL = {"column__cell": 0.004, "column__height": 0.12, "run__fluid_step": 5e-4}
 MANY = {
     "films, agitation, history force": case_of(
-        BEADS, **TALL, laws__agitation="pseudo_turbulence", laws__history="basset", run__energy_budget=True
+        BEADS, **TALL, laws__agitation="pseudo_turbulence", laws__history="basset", run__energy_budget=True,
+        laws__surface="smeared",
     ),
     "sharp surfaces": case_of(BEADS, **TALL, laws__surface="sharp"),
     "hot gas, beside walls": case_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -234,9 +234,9 @@ def test_mordants_bead_reaches_its_velocity_in_time() -> None:
 
 @pytest.mark.parametrize(("model", "agitation"), [("A", "none"), ("B", "none"), ("A", "free_spheres")])
 def test_momentum_is_kept(model: str, agitation: str) -> None:
-    case = suspension(
-        **{"laws.model": model, "laws.history": "mei_adrian", "laws.added_mass": 0.5, "laws.agitation": agitation}
-    )
+    laws: dict[str, Any] = {"model": model, "history": "mei_adrian", "added_mass": 0.5, "agitation": agitation}
+    laws["surface"] = "smeared"
+    case = suspension(**{f"laws.{key}": value for key, value in laws.items()})
     simulation = stirred(case)
     start, scale = momentum(simulation), float((simulation.particles.mass * 0.02).sum())
     for _ in range(20):

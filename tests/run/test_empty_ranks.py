@@ -67,8 +67,8 @@ FEW = {
         laws__agitation="pseudo_turbulence", **ALL_FORCES,
     ),
     "three beads with a fluctuating force and drag beside walls": case_of(
-        BEADS, **SMALL, bed__positions=THREE, laws__agitation="lattanzi", laws__wall_drag="nearest",
-        laws__mapping="divided", laws__drag="beetstra_polydisperse",
+        BEADS, **SMALL, bed__positions=THREE, laws__agitation="lattanzi", laws__surface="smeared",
+        laws__wall_drag="nearest", laws__mapping="divided", laws__drag="beetstra_polydisperse",
     ),
     "feeds and outlets": case_of(
         BEADS + EQUIPMENT, **SMALL | {"bed__initial_velocity": [0.0, 0.0, 0.0]}, bed__positions=THREE

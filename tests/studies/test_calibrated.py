@@ -39,6 +39,7 @@ start_corner = [0.045, 0.0, 0.0]
 start_size = [0.03, 0.006, 0.045]
 [laws]
 rolling_resistance = "spring_dashpot"
+surface = "smeared"
 [run]
 until = 0.5
 every = 0.1

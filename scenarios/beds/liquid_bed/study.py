@@ -50,8 +50,8 @@ class FluidisedBed:
 
 
 def glass(velocity: float) -> Case:
-    """The case of the gallery at another velocity [m/s], in a column high enough, with a smeared surface."""
-    changes = {"bed.inlet_velocity": velocity, "column.height": 0.04, "laws.surface": "smeared"}
+    """The case of the gallery at another velocity [m/s], in a column high enough."""
+    changes = {"bed.inlet_velocity": velocity, "column.height": 0.04}
     return Case.from_toml(gallery_files()["liquid-bed"], changes)
 
 

@@ -102,6 +102,7 @@ def bed(setting: Setting, seed: int) -> Case:
         "material.sphere.contact_modulus": setting.modulus,
         "bed.seed": seed,
         "laws.agitation": setting.agitation,
+        "laws.surface": "smeared",
         **SPHERES[setting.spheres],
     })  # fmt: skip
     exponent, velocity = expansion_exponents(case)["Richardson-Zaki"]

@@ -156,7 +156,7 @@ def beds(folder: Path, progress: Progress) -> Iterator[Row]:
     def bed(beads: str, velocity: float, agitation: str, seed: int = 1) -> FluidisedBed:
         name = f"bed-{beads}-{1e3 * velocity:g}-{agitation}-seed{seed}"
         progress(name)
-        changes = {"laws.agitation": agitation, "bed.seed": seed}
+        changes = {"laws.agitation": agitation, "laws.surface": "smeared", "bed.seed": seed}
         return FluidisedBed(**kept(folder / f"{name}.json", lambda: asdict(fluidise(BEDS[beads], velocity, **changes))))
 
     glass = [(beads, velocity) for beads in ("glass", "coarse glass") for velocity in BEDS[beads].velocities]
@@ -288,6 +288,7 @@ def case_of(point: Point, row: dict[str, Any], **changes: Any) -> Case:
         laws={
             "drag": "tenneti",
             "agitation": "free_spheres",
+            "surface": "smeared",
             "self_disturbance_correction": False,
             "kernel_width": 0.5 * point.box,
             "gravity": (0.0, 0.0, -weight / (volume * excess)),

@@ -144,6 +144,7 @@ def bed(point: Point, film: str, seed: int) -> Case:
         "material.sphere.youngs_modulus": SOFT * softened if film == "soft" else case.solid.youngs_modulus,
         "laws.lubrication": "none" if film == DRY else case.laws.lubrication,
         "laws.agitation": "free_spheres" if point.agitated else "none",
+        "laws.surface": "smeared",
         "column.height": cell * math.ceil(ROOM * height / cell),
         "run.until": end,
         "run.average_from": SETTLED * height / velocity,

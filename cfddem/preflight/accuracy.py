@@ -1,0 +1,121 @@
+"""What cells, kernel and fluid step cost in accuracy, as far as it was measured in beds of the validation.
+
+The numbers are those of `docs/tables` and of the tables of the gallery; a case of its own may differ from these beds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.step_estimate import StepEstimate
+
+PACKED_SMEARED = ((2.0, 0.69), (4.0, 0.89), (8.0, 0.94), (12.0, 0.95))
+"""Height of a fixed poured bed in cells of three diameters, and its pressure drop over that of its law."""
+
+PACKED_SHARP = ((1.25, 0.97), (2.5, 0.976), (10.0 / 3.0, 0.94), (5.0, 0.87))
+"""Cell over diameter, and the pressure drop of a fixed lattice of six layers over that of its law."""
+
+BY_KERNEL = ((1.0, 1.11), (1.5, 1.0), (2.0, 0.90), (2.5, 0.80))
+"""Width of the kernel in diameters, and the granular temperature of the bed of glass beads with agitation and smeared
+surfaces, over that at 1.5 (`docs/gallery/agitation.md`)."""
+
+
+class Change(NamedTuple):
+    """By what a result changed in a bed of the validation."""
+
+    name: str
+    value: float
+    error: float  # standard error
+    table: str  # of `docs/tables`
+    row: str  # that it is read from
+    bed: str
+
+    @property
+    def note(self) -> str:
+        """Bed and standard error, in words."""
+        return f"+- {self.error:.2g}, in the {self.bed}"
+
+
+STEPS = "smooth, 1e+05 Pa: {}, fluid step over a tenth of it"
+FINER = "{} gas bed, cells finer by 1.5: {} over the reference run"
+
+LIQUID = (
+    Change("tenth of fluid step: collisions", 0.944, 0.028, "bed-steps", STEPS.format("collisions of a sphere"),
+           "bed of the film study"),
+    Change("the same: granular temperature", 0.948, 0.012, "bed-steps", STEPS.format("granular temperature"),
+           "bed of the film study"),
+    Change("cells finer by 1.5: bed height", 1.008, 0.004, "beds",
+           "liquid bed, cells finer by 1.5: height over the reference run", "bed of alginate beads"),
+)  # fmt: skip
+"""Beds in a liquid, with smeared surfaces."""
+
+GAS = (
+    Change("cells finer by 1.5: bed height", 0.997, 0.005, "beds", FINER.format("slugging", "height"), "slugging bed"),
+    Change("the same: pressure drop", 0.998, 0.004, "beds", FINER.format("slugging", "pressure drop"), "slugging bed"),
+    Change("the same: its deviation in time", 0.77, 0.039, "beds",
+           FINER.format("slugging", "standard deviation of the pressure"), "slugging bed"),
+)  # fmt: skip
+"""Beds in a gas."""
+
+
+def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tuple[str, float, str, str]]:
+    """Name, value, unit and note of what the cells, the kernel and the fluid step of a case change.
+
+    Only of beds on a grid, with the kernel; nothing of what was not measured.
+    """
+    width = case.laws.kernel_width * case.bed.largest_diameter
+    if steps.cells is None or not case.resists or case.is_one_sphere or width == 0.0:
+        return
+    cell = max(length / count for length, count in zip(case.column.size, steps.cells) if count > 1)
+    yield "filter width / kernel", widening(cell / width, case.surface), "", "of what drag sees; cells widen it"
+    if math.isnan(bed.archimedes):
+        return
+    if case.bed.fixed or bed.inlet <= bed.onset:
+        high = bed.height / case.column.height * steps.cells[2]
+        sharp = case.surface == "sharp"
+        table, at = (PACKED_SHARP, cell / case.bed.diameter) if sharp else (PACKED_SMEARED, high)
+        measured = "a lattice of six layers" if sharp else f"fixed beds, here {high:.2g} cells"
+        yield "packed bed: pressure drop / law", between(table, at), "", f"as measured in {measured}"
+        return
+    for each in LIQUID if case.in_liquid else GAS:
+        yield each.name, each.value, "", each.note
+    if case.in_liquid and case.laws.kernel_width != 1.5:
+        note = "over that at 1.5 d, in the bed of glass beads"
+        yield "this kernel: granular temperature", between(BY_KERNEL, case.laws.kernel_width), "", note
+
+
+def widening(cell: float, surface: str) -> float:
+    r"""Standard deviation of the filter of what the drag sees, over that of the kernel [-].
+
+    .. math:: \sqrt{\max(1, h^2/6\sigma^2) + h^2/6\sigma^2}
+
+    with smeared surfaces. With sharp ones, whose cells are up to four times finer, the root of
+    :math:`\max(1, h^2/48\sigma^2)`.
+
+    cell     over the standard deviation of the kernel [-]
+    surface  "smeared" or "sharp"
+
+    >>> round(widening(2.0, "smeared"), 2), widening(2.0, "sharp")
+    (1.29, 1.0)
+    """
+    own = cell**2 / 6.0
+    return math.sqrt(max(1.0, own) + own if surface == "smeared" else max(1.0, own / 8.0))
+
+
+def between(table: tuple[tuple[float, float], ...], at: float) -> float:
+    """Value of a table of (place, value), linear between its places and constant beyond them.
+
+    >>> between(((1.0, 0.5), (3.0, 0.7)), 2.0)
+    0.6
+    """
+    if at <= table[0][0]:
+        return table[0][1]
+    for (low, first), (high, last) in pairwise(table):
+        if at <= high:
+            return first + (last - first) * (at - low) / (high - low)
+    return table[-1][1]
