@@ -27,6 +27,8 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
     if not found.patches:
         return base
     listed = base if isinstance(base, list) else [base]
+    if any(each.shape == "whole" and not each.brings for each in found.patches.values()):
+        listed = [NoSlip()]  # nothing of the side itself is left
     made, inlets = [*listed], found.inlets
     for name, each in found.patches.items():
         if not each.brings:
