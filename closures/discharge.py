@@ -49,3 +49,20 @@ def cone_factor(slope: float) -> float:
     1.0
     """
     return float(min(slope, 1.0) ** STEEP)
+
+
+@law("discharge", "Crewdson, Ormond & Nedderman, Powder Technol. 16 (1977) 197; form and source from memory")
+def air_factor(gradient: float) -> float:
+    r"""Discharge with a pressure gradient of the gas in the orifice over that without.
+
+    .. math:: \frac{W}{W_0} = \sqrt{1 + \frac{1}{\rho_b\,g}\frac{dp}{dz}}
+
+    gradient  dp/dz over rho_b g, positive where the gas pushes the particles out [-]
+    returns   W/W0 [-]
+
+    Range: a gradient that acts as more or less gravity on the particles in the orifice; 0 where it carries them.
+
+    >>> air_factor(0.44)
+    1.2
+    """
+    return math.sqrt(max(1.0 + gradient, 0.0))

@@ -116,7 +116,8 @@ def buoyant_weight(case: Case) -> float:
 
 def _equipped(case: Case) -> bool:
     """Whether walls, feeds or outlets change the floor area or the number of particles."""
-    return bool(case.wall or case.feed or case.outlet or (case.vessel and not case.vessel.is_upright))
+    changed = case.wall or case.feed or case.outlet or case.drains
+    return bool(changed or (case.vessel and not case.vessel.is_upright))
 
 
 def weight_over_floor(case: Case) -> float | None:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.case.openings import with_openings
+from cfddem.case.patches import CasePatch
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import CaseVessel
 from cfddem.case.vessel_surface import surface_in
@@ -23,16 +25,20 @@ def grid_of(case: CaseTables) -> Grid:
     if case.has_smooth_walls:
         thin = case.thin_walls
         stamps = tuple(stamp(each) for each in (case.vessel, *thin) if each)
-        return _in_vessel(case.column, case.vessel, thin, stamps)
+        return _in_vessel(case.column, case.vessel, case.openings, thin, stamps)
     walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
 @lru_cache(maxsize=8)
 def _in_vessel(
-    column: Column, vessel: CaseVessel | None, thin: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]
+    column: Column,
+    vessel: CaseVessel | None,
+    openings: tuple[CasePatch, ...],
+    thin: tuple[CaseWall, ...],
+    _: tuple[tuple[int, int], ...],
 ) -> Grid:
-    surface: Any = surface_in(vessel, column) if vessel else None
+    surface: Any = with_openings(surface_in(vessel, column), column, openings) if vessel else None
     if thin:
         surface = divided(thin_wall(*(triangles(wall) for wall in thin)), surface)
     return within(Grid.of_size(column.size, column.cell), surface)

@@ -99,14 +99,16 @@ def _without_moved_keys(
         homes = [each for each in model.model_fields if _has_all(model.model_fields[each], words)]
         missing = [each for each in homes if isinstance(values, Mapping) and each not in values]
         home = next(iter(missing or (each for each in homes if "." in _header(each, model.model_fields[each]))), None)
-        if home is None or len(words) < 2:
+        if home is None:
             continue
-        first, header = (*table, words[0]), _header(home, model.model_fields[home])
+        owner, wrong = model.model_fields[home], [str(key[-1]) for key in reported if key and key[:-1] == table]
+        words = [*words, *(word for word in wrong if word not in words and _has_all(owner, [word]))]
+        if len(words) < 2:
+            continue
+        first, header = (*table, words[0]), _header(home, owner)
         limit = f"below a line {header}, as {', '.join(words[1:MOST])} after it"
         errors.append((first, InputError(dotted(first), None, limit, "the line is missing")))
-        owner = model.model_fields[home]
-        shared = [str(key[-1]) for key in reported if key[:-1] == table and _has_all(owner, [str(key[-1])])]
-        moved = {(home,), *((*table, word) for word in (*words, *shared))}
+        moved = {(home,), *((*table, word) for word in words)}
         reported = {key: several for key, several in reported.items() if key not in moved}
     return reported, errors
 

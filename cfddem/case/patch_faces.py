@@ -1,4 +1,4 @@
-"""Which faces of floor and lid the patches of a case cover, and what their inlets bring.
+"""Which faces of floor, lid and sides the patches of a case cover, and what their inlets bring.
 
 Faces of cells do not follow the edge of a disc: through one that a patch covers in part, that part of the flow enters.
 """
@@ -13,14 +13,18 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
-from cfddem.case.patches import CasePatch, open_area_of
+from cfddem.case.patches import ENDS, PLANES, CasePatch, along, lengths_of, middle_of, on_the_side, open_area_of
 from cfddem.case.tables import CaseTables
 from cfddem.fluid.cut_cells import section
+from cfddem.fluid.grid import layers
 
 Array = NDArray[np.float64]
 
 PLACES = 24
 """Places along an edge of a face at which a patch is sampled."""
+
+SIDE_OF: Mapping[str, str] = {"z_low": ENDS[0], "z_high": ENDS[1]} | {name: name for name in PLANES if name not in ENDS}
+"""Sides by their names in the fluid -> those of patches."""
 
 HALF = 0.5
 """Share of a face that an outlet or a wall must cover to have it [-]."""
@@ -30,8 +34,9 @@ class PatchFaces(NamedTuple):
     """The patches of a side and its faces.
 
     patches  by name
-    shares   velocity through the open part of each face over that of the patch, by name (ny, nx) [-]
-    rest     share of each face that is left to the inlet of the side itself (ny, nx) [-]
+    shares   velocity through the open part of each face over that of the patch, by name (ny, nx), (nz, ny) or (nz, nx)
+             [-]
+    rest     share of each face that is left to the inlet of the side itself [-]
     """
 
     patches: Mapping[str, CasePatch]
@@ -39,17 +44,17 @@ class PatchFaces(NamedTuple):
     rest: Any
 
     def whole(self, name: str) -> NDArray[np.bool_]:
-        """The faces that an outlet or a wall has (ny, nx)."""
+        """The faces that an outlet or a wall has."""
         return np.asarray(self.shares[name] >= HALF * self.shares[name].max())
 
     @property
     def inlets(self) -> list[str]:
-        """Names of the inlets."""
-        return [name for name, each in self.patches.items() if each.kind == "inlet"]
+        """Names of the inlets of a given flow."""
+        return [name for name, each in self.patches.items() if each.brings]
 
 
 def patch_faces(case: CaseTables, side: str) -> PatchFaces:
-    """The faces of the patches of a side, "floor" or "lid"; InputError for a patch that covers no opening."""
+    """The faces of the patches of a side; InputError for a patch that covers no opening."""
     patches = {name: each for name, each in case.patches.items() if each.side == side}
     made = PatchFaces(patches, {name: coverage(case, each) for name, each in patches.items()}, 1.0)
     for name, share in made.shares.items():
@@ -59,53 +64,56 @@ def patch_faces(case: CaseTables, side: str) -> PatchFaces:
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
     entering = [_covered(case, patches[name], made.shares[name]) for name in made.inlets]
     for name, each in patches.items():
-        if each.mass_flow is not None:  # exactly, also where faces do not follow the edge
-            area, face = open_area_of(case, each), grid_of(case).face_area(2)
+        opens = bool(case.vessel) and side not in ENDS
+        if each.brings and (each.mass_flow is not None or opens):  # exactly, also where faces do not follow the edge
+            area, face = open_area_of(case, each), grid_of(case).face_area(PLANES[side][0])
             made.shares[name][:] *= area / (float((made.shares[name] * _apertures(case, side)).sum()) * face)
-    closed = [made.whole(name) for name, each in patches.items() if each.kind != "inlet"]
+    closed = [made.whole(name) for name, each in patches.items() if not each.brings]
     beside = np.maximum(1.0 - sum(entering), 0.0)
     return made._replace(rest=np.where(np.any(closed, axis=0), 0.0, beside) if closed else beside)
 
 
 def _apertures(case: CaseTables, side: str) -> Array:
-    """Open share of every face of floor or lid (ny, nx) [-]."""
-    grid, layer = grid_of(case), 0 if side == "floor" else -1
-    share = grid.open[layer].astype(float)
+    """Open share of every face of a side [-]."""
+    grid, (axis, high) = grid_of(case), PLANES[side]
+    here = layers(axis, -1 if high else 0)
+    share: Array = grid.open[here].astype(float)
     if grid.walls:
-        points = [each[layer] for each in np.broadcast_arrays(*grid.faces(2))]
-        share *= section(grid.walls, points, 2, grid.spacing).share
+        points = [each[here] for each in np.broadcast_arrays(*grid.faces(axis))]
+        share *= section(grid.walls, points, axis, grid.spacing).share
     return share
 
 
 def coverage(case: CaseTables, patch: CasePatch) -> Array:
-    """Velocity through the open part of each face of a side over that of the patch (ny, nx) [-]."""
-    (width, depth, height), (nx, ny, nz) = case.column.size, grid_of(case).cells
-    z, solid = (0.0, 0) if patch.side == "floor" else (height, nz - 1)
+    """Velocity through the open part of each face of a side over that of the patch [-]."""
+    (width, depth), (axis, high), grid = lengths_of(case, patch.side), PLANES[patch.side], grid_of(case)
+    nx, ny = (grid.cells[d] for d in along(patch.side))
     x = (np.arange(nx * PLACES) + 0.5) * width / (nx * PLACES)
     made = np.zeros((ny, nx))
-    for row, is_open in enumerate(grid_of(case).open[solid]):
+    for row, is_open in enumerate(grid.open[layers(axis, -1 if high else 0)]):
         y = (row * PLACES + np.arange(PLACES)[:, None] + 0.5) * depth / (ny * PLACES)
-        places = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
         inside = np.repeat(is_open, PLACES) * np.ones(y.shape)
         if case.vessel:
-            inside = inside * (case.beyond_the_side(places.reshape(-1, 3)) <= 0.0).reshape(inside.shape)
-        weight = patch.weight(x, y, (0.5 * width, 0.5 * depth)) * inside
+            at = [each.ravel() for each in np.broadcast_arrays(x, y)]
+            inside = inside * on_the_side(case, patch.side, *at).reshape(inside.shape)
+        weight = patch.weight(x, y, middle_of(case, patch.side)) * inside
         sums = [values.reshape(PLACES, nx, PLACES).sum(axis=(0, 2)) for values in (weight, inside)]
         made[row] = sums[0] / np.maximum(sums[1], 1.0)
     return made
 
 
 def _covered(case: CaseTables, patch: CasePatch, share: Array) -> Array:
-    """Share of the open part of each face that a patch covers, whatever its profile (ny, nx) [-]."""
+    """Share of the open part of each face that a patch covers, whatever its profile [-]."""
     return (
         share.copy() if patch.profile == "uniform" else coverage(case, patch.model_copy(update={"profile": "uniform"}))
     )
 
 
-def face_at(case: CaseTables, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the faces of floor and lid at some places."""
-    hx, hy, _ = grid_of(case).spacing
-    return np.floor(y / hy).astype(int), np.floor(x / hx).astype(int)
+def face_at(case: CaseTables, side: str, *place: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of the faces of a side at some places x, y, z [m]."""
+    first, second = along(side)
+    row, column = (np.floor(place[d] / grid_of(case).spacing[d]).astype(int) for d in (second, first))
+    return row, column
 
 
 def brought_in(
@@ -120,14 +128,14 @@ def brought_in(
     """
     if not of_patches:
         return rest
-    found = {side: patch_faces(case, side) for side in ("floor", "lid")}
+    found = {name: patch_faces(case, side) for name, side in SIDE_OF.items()}
     own = case.bed.highest_inlet_velocity if case.column.ends == "flow" else 0.0
 
-    def values(side: str, x: Array, y: Array, _: Array) -> Array:
-        faces = found["floor" if side == "z_low" else "lid"]
+    def values(side: str, x: Array, y: Array, z: Array) -> Array:
+        faces = found[side]
         if not faces.inlets:
             return np.full(np.shape(x), rest)
-        at = face_at(case, x, y)
+        at = face_at(case, SIDE_OF[side], x, y, z)
         flow = {name: faces.patches[name].highest * faces.shares[name][at] for name in faces.inlets}
         beside = own * (side == "z_low") * faces.rest[at]
         total = beside + sum(flow.values())

@@ -1,4 +1,4 @@
-"""Patches of floor and lid, by name: inlets, outlets and closed parts for the fluid."""
+"""Patches of floor, lid and sides, by name: inlets, outlets and closed parts for the fluid."""
 
 from __future__ import annotations
 
@@ -32,22 +32,36 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "whole": (), "disc": ("diameter",), "ring": ("diameter", "inner_diameter"), "box": ("size",),
 }  # fmt: skip
 
-OF_INLETS: Mapping[str, str] = {
-    "velocity": "inlet", "mass_flow": "inlet", "profile": "inlet", "pressure": "outlet",
+OF_KINDS: Mapping[str, tuple[str, ...]] = {
+    "velocity": ("inlet",), "mass_flow": ("inlet",), "profile": ("inlet",), "pressure": ("inlet", "outlet"),
 }  # fmt: skip
-"""Keys of one kind of patch -> the kind."""
+"""Keys of some kinds of patch -> these kinds."""
+
+PLANES: Mapping[str, tuple[int, bool]] = {
+    "floor": (2, False), "lid": (2, True),
+    "x_low": (0, False), "x_high": (0, True), "y_low": (1, False), "y_high": (1, True),
+}  # fmt: skip
+"""Sides of the column -> the axis that each is normal to, and whether it is at its high end."""
+
+ENDS = ("floor", "lid")
+"""Sides at the ends of a vessel; patches of others are openings in its wall."""
 
 
 class CasePatch(Checked):
-    """A part of floor or lid where fluid enters, leaves, or meets a wall; particles meet floor and lid everywhere."""
+    """A part of floor, lid or a side where fluid enters, leaves, or meets a wall; particles meet a wall everywhere."""
 
     kind: Literal["inlet", "outlet", "wall"] = Field(description="fluid enters, leaves, or meets a wall")
-    side: Literal["floor", "lid"] = Field("floor", description="side of the column on which it is")
+    side: Literal["floor", "lid", "x_low", "x_high", "y_low", "y_high"] = Field(
+        "floor",
+        description="side of the column on which it is; through the wall of a vessel a straight duct leads to it",
+    )
     shape: Literal["whole", "disc", "ring", "box"] = Field("whole", description="the whole side, or a part of it")
-    centre: Place | None = Field(None, description="middle of the patch (x, y); default: that of the side [m]")
+    centre: Place | None = Field(
+        None, description="middle of the patch: (x, y), or (y, z) or (x, z) on a side; default: that of the side [m]"
+    )
     diameter: Positive | None = Field(None, description="diameter of a disc, or outer one of a ring [m]")
     inner_diameter: Positive | None = Field(None, description="inner diameter of a ring [m]")
-    size: tuple[Positive, Positive] | None = Field(None, description="edges of a box along x and y [m]")
+    size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, along the axes of centre [m]")
     velocity: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
         None, description="superficial velocity of an inlet, into the column: a number, or [time, velocity] pairs [m/s]"
     )
@@ -57,7 +71,15 @@ class CasePatch(Checked):
     profile: Literal["uniform", "parabolic"] = Field(
         "uniform", description="over a disc: the same velocity, or twice the mean in the middle and 0 at the edge"
     )
-    pressure: float = Field(0.0, description="pressure p' at an outlet [Pa]")
+    pressure: float | None = Field(
+        None,
+        allow_inf_nan=False,
+        description="pressure p' at an outlet, default 0, or at an inlet in place of velocity [Pa]",
+    )
+
+    particles: Literal["stay", "leave"] = Field(
+        "stay", description="whether particles meet a wall here, or leave where they touch it, all within the patch"
+    )
 
     @model_validator(mode="after")
     def _keys_suit_kind_and_shape(self) -> CasePatch:
@@ -67,18 +89,22 @@ class CasePatch(Checked):
         for name in NEEDED[self.shape]:
             if getattr(self, name) is None:
                 raise InputError(name, None, f'given for shape = "{self.shape}"')
-        for name, kind in OF_INLETS.items():
-            if kind != self.kind and getattr(self, name) != type(self).model_fields[name].default:
+        for name, kinds in OF_KINDS.items():
+            if self.kind not in kinds and getattr(self, name) != type(self).model_fields[name].default:
                 raise InputError(name, shown(getattr(self, name)), f'left out for kind = "{self.kind}"')
-        given = [name for name in ("velocity", "mass_flow") if getattr(self, name) is not None]
-        if self.kind == "inlet" and not given:
-            raise InputError("velocity", None, "given for an inlet", "or mass_flow, in kg/s")
-        if len(given) > 1:
+        driven = [name for name in ("velocity", "mass_flow", "pressure") if getattr(self, name) is not None]
+        if self.kind == "inlet" and not driven:
+            raise InputError("velocity", None, "given for an inlet", "or mass_flow, in kg/s, or pressure, in Pa")
+        if len(driven) > 1:
+            limit = f"left out where there is a {driven[0]}"
+            raise InputError(driven[1], shown(getattr(self, driven[1])), limit, "give one of them")
+        for name in ("velocity", "mass_flow"):
+            if name in driven:
+                check_times(name, getattr(self, name))
+        if self.profile == "parabolic" and "pressure" in driven:
             raise InputError(
-                "mass_flow", shown(self.mass_flow), "left out where there is a velocity", "give one of them"
+                "profile", self.profile, "left out where there is a pressure", "the pressure drives the flow"
             )
-        for name in given:
-            check_times(name, getattr(self, name))
         if self.inner_diameter and self.inner_diameter >= (self.diameter or 0.0):
             raise InputError("inner_diameter", self.inner_diameter, f"below the diameter, {self.diameter:g} m")
         if self.profile == "parabolic" and self.shape != "disc":
@@ -99,6 +125,11 @@ class CasePatch(Checked):
         return self.model_copy(update={"velocity": speed})
 
     @property
+    def brings(self) -> bool:
+        """Whether it is an inlet of a given flow; a pressure drives the others that are open."""
+        return self.kind == "inlet" and self.pressure is None
+
+    @property
     def highest(self) -> float:
         """Highest superficial velocity of an inlet over time, its mean over the patch [m/s]."""
         return max(speeds_of(self.velocity or 0.0))
@@ -117,17 +148,32 @@ class CasePatch(Checked):
     def weight(self, x: Array, y: Array, middle: Place) -> Array:
         """Velocity at places on the side over its mean, 0 outside of the patch [-].
 
+        x, y    of the places, or the coordinates on another side, in the order of `centre` [m]
         middle  of the side [m]
         """
-        across, along = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
+        inside = self.holds(x, y, middle).astype(float)
+        if self.profile != "parabolic":
+            return inside
+        away = np.hypot(x - (self.centre or middle)[0], y - (self.centre or middle)[1])
+        return np.asarray(inside * 2.0 * (1.0 - (2.0 * away / (self.diameter or math.inf)) ** 2))
+
+    def holds(self, x: Array, y: Array, middle: Place, radius: Array | float = 0.0) -> NDArray[np.bool_]:
+        """Which discs at places on the side lie within the patch; arguments as of `weight`.
+
+        radius  of the discs [m]
+        """
+        across, beside = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
         if self.shape == "whole":
-            return np.ones(np.shape(across + along))
+            return np.ones(np.shape(across + beside), bool)
         if self.shape == "box":
             width, depth = self.size or (0.0, 0.0)
-            return ((np.abs(across) <= 0.5 * width) & (np.abs(along) <= 0.5 * depth)).astype(float)
-        away, outer = np.hypot(across, along), 0.5 * (self.diameter or 0.0)
-        inside = (away <= outer) & (away >= 0.5 * (self.inner_diameter or 0.0))
-        return np.where(inside, 2.0 * (1.0 - (away / outer) ** 2) if self.profile == "parabolic" else 1.0, 0.0)
+            inside = (np.abs(across) + radius <= 0.5 * width) & (np.abs(beside) + radius <= 0.5 * depth)
+        else:
+            away = np.hypot(across, beside)
+            inside = away + radius <= 0.5 * (self.diameter or 0.0)
+            if self.inner_diameter:
+                inside = inside & (away - radius >= 0.5 * self.inner_diameter)
+        return np.asarray(inside)
 
     @property
     def area(self) -> float:
@@ -137,22 +183,47 @@ class CasePatch(Checked):
         return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf
 
 
+def along(side: str) -> tuple[int, int]:
+    """The two axes along a side, in the order of `centre`."""
+    first, second = (d for d in range(3) if d != PLANES[side][0])
+    return first, second
+
+
+def lengths_of(case: Any, side: str) -> Place:
+    """Lengths of a side of the column, in the order of `centre` [m]."""
+    first, second = along(side)
+    return case.column.size[first], case.column.size[second]
+
+
+def middle_of(case: Any, side: str) -> Place:
+    """Middle of a side of the column, in the order of `centre` [m]."""
+    first, second = lengths_of(case, side)
+    return 0.5 * first, 0.5 * second
+
+
 def on_the_side(case: Any, side: str, x: Array, y: Array) -> NDArray[np.bool_]:
-    """Which places (N,) of the plane of floor or lid lie within the column of a case and its vessel (N,)."""
-    width, depth, height = case.column.size
-    z = np.full(x.size, 0.0 if side == "floor" else height)
+    """Which places (N,) of the plane of a side lie within the column of a case and its vessel (N,); on a side that a
+    vessel does not reach, within the ducts of its openings.
+
+    x, y  coordinates in the order of `centre` [m]
+    """
+    (width, depth), (axis, high) = lengths_of(case, side), PLANES[side]
     inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
-    return np.asarray(inside & (case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0))
+    if side not in ENDS and case.vessel:
+        ducts = (each.weight(x, y, (0.5 * width, 0.5 * depth)) > 0.0 for each in case.openings if each.side == side)
+        return np.asarray(inside & np.any([*ducts], axis=0))
+    places = np.insert(np.stack([x, y], axis=-1), axis, case.column.size[axis] if high else 0.0, axis=-1)
+    return np.asarray(inside & (case.beyond_the_side(places) <= 0.0))
 
 
 def _sampled(case: Any, patch: CasePatch) -> tuple[Array, NDArray[np.bool_]]:
     """Weights of a patch at places on and around it, and which of these lie on its side of the vessel."""
-    width, depth, _ = case.column.size
+    width, depth = lengths_of(case, patch.side)
     middle = patch.centre or (0.5 * width, 0.5 * depth)
     edges = patch.size or (2.0 * width, 2.0 * depth)
     reach = patch.diameter or float(max(edges))
-    along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
-    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
+    around = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
+    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + around, middle[1] + around))
     return patch.weight(x, y, middle), on_the_side(case, patch.side, x, y)
 
 
@@ -176,7 +247,7 @@ def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float]) -> None:
 
     key  of the table with these names
     """
-    inlets = [name for name, each in case.patch.items() if each.kind == "inlet"]
+    inlets = [name for name, each in case.patch.items() if each.brings]
     for name in names:
         if name not in inlets:
             limit = "one of the inlets " + ", ".join(inlets) if inlets else "left out without inlets by [patch.NAME]"

@@ -22,6 +22,7 @@ from cfddem.case.feeds import refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import Material, check_pairs, unknown_materials
+from cfddem.case.openings import refuse_openings
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
@@ -112,7 +113,9 @@ class Case(CaseTables):
         first, ends = next(iter(self.patch)), self.column.ends
         if not self.fluid or ends == "periodic":
             where = "without a fluid" if not self.fluid else 'where column.ends is "periodic"'
-            raise InputError(f"patch.{first}", None, f"left out {where}", "patches are for the fluid at floor and lid")
+            remedy = "patches are for the fluid between walls"
+            raise InputError(f"patch.{first}", None, f"left out {where}", remedy)
+        refuse_openings(self)
         if self.bed.jet:
             raise InputError("bed.jet", None, "left out where there are patches", 'make it a patch, kind = "inlet"')
         kinds = [(each.kind, each.side, each.shape) for each in self.patch.values()]

@@ -15,7 +15,7 @@ from cfddem.case.case_laws import CaseLaws
 from cfddem.case.compare import CaseData
 from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
-from cfddem.case.patches import CasePatch, open_area_of
+from cfddem.case.patches import ENDS, CasePatch, lengths_of, open_area_of
 from cfddem.case.vessel_shape import CaseVessel, Line
 from cfddem.case.vessel_surface import area_of_end, surface_in
 from cfddem.case.walls import CaseWall
@@ -119,7 +119,7 @@ class CaseTables(Checked):
     pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
     column: Column
     vessel: CaseVessel | None = Field(None, description="a round vessel with a smooth wall, in the column")
-    patch: dict[Name, CasePatch] = Field({}, description="inlets, outlets and walls on floor and lid, by name")
+    patch: dict[Name, CasePatch] = Field({}, description="inlets, outlets and walls on floor, lid and sides, by name")
     bed: Bed
     wall: tuple[CaseWall, ...] = Field((), description="walls beside those of the column")
     feed: tuple[CaseFeed, ...] = Field((), description="boxes in which particles enter during the run")
@@ -202,8 +202,20 @@ class CaseTables(Checked):
             for name, each in self.patch.items()
         }
 
+    @property
+    def openings(self) -> tuple[CasePatch, ...]:
+        """Patches that are openings in the wall of the vessel; none without a vessel."""
+        return tuple(each for each in self.patch.values() if each.side not in ENDS) if self.vessel else ()
+
+    @property
+    def drains(self) -> dict[str, CasePatch]:
+        """Patches through which particles leave, by name."""
+        return {name: each for name, each in self.patch.items() if each.particles == "leave"}
+
     def area_of(self, side: str) -> float:
-        """Area of the floor or the lid [m2]."""
+        """Area of the floor, the lid, or a side of a box [m2]."""
+        if side not in ENDS:
+            return math.prod(lengths_of(self, side))
         return self.column.floor_area if not self.vessel else area_of_end(self.vessel, self.column, side)
 
     @property
@@ -219,11 +231,13 @@ class CaseTables(Checked):
         """Area of the floor, inside the vessel if there is one [m2]."""
         return self.area_of("floor")
 
-    def beyond_the_side(self, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.float64]:
+    def beyond_the_side(
+        self, places: NDArray[np.float64], margin: float | NDArray[np.float64] = 0.0
+    ) -> NDArray[np.float64]:
         """How far places (N, 3) are outside of the vessel or of a round column, across it if it is round (N,); negative
         inside, or in a box without a vessel [m].
 
-        margin  from the wall, across it [m]
+        margin  from the wall, across it, a number or one of each place [m]
         """
         if self.vessel and not self.vessel.is_round:
             return np.asarray(margin - surface_in(self.vessel, self.column).distance(*places.T))

@@ -1,4 +1,4 @@
-"""Feeds and outlets of a case: particles that enter and leave during a run."""
+"""Feeds and outlets of a case: particles that enter and leave during a run, through boxes and openings."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from cfddem.backend.errors import RunFailed
 from cfddem.case.bed import CaseFeed, Species
 from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.particle_properties import SPECIES, diameters_of
+from cfddem.case.patches import PLANES, CasePatch, along, middle_of
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
+
+TOUCHING = 0.05
+"""Gap between a particle and an opening, over its radius, at which it leaves: before the wall pushes it back [-]."""
 
 _FED = 2
 """Random numbers of the feeds; others use the seed alone, or with other numbers."""
@@ -46,42 +50,44 @@ class Feeds(CaseFeature):
                  "number of particles that are due, and wait for a free place in the box of a feed",
                  lambda feeds, _: feeds.waiting, lambda case: case.feed),
         Measured("removed_count", "1", "recorded", "number of particles that outlets have removed so far",
-                 lambda feeds, _: feeds.removed[0], lambda case: case.outlet),
+                 lambda feeds, _: feeds.removed[0], lambda case: _drained(case)),
         Measured("removed_mass", "kg", "recorded", "mass of the particles that outlets have removed so far",
-                 lambda feeds, _: feeds.removed[1], lambda case: case.outlet),
+                 lambda feeds, _: feeds.removed[1], lambda case: _drained(case)),
         Measured("residence_time", "s", "recorded",
                  "mean residence time of the particles that outlets have removed so far; with feeds, of fed ones",
-                 lambda feeds, _: feeds.of_residence_times[0], lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[0], lambda case: _drained(case)),
         Measured("residence_time_deviation", "s", "recorded", "standard deviation of these residence times",
-                 lambda feeds, _: feeds.of_residence_times[1], lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[1], lambda case: _drained(case)),
         Measured("residence_time_10", "s", "recorded",
                  "residence time that a tenth of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[2], lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[2], lambda case: _drained(case)),
         Measured("residence_time_50", "s", "recorded",
                  "residence time that half of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[3], lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[3], lambda case: _drained(case)),
         Measured("residence_time_90", "s", "recorded",
                  "residence time that nine tenths of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[4], lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[4], lambda case: _drained(case)),
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
-        self.outlets = [
-            ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True) for each in case.outlet
-        ]
+        self.outlets: dict[str, ParticleOutlet] = {
+            f"outlet.{number}": ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True)
+            for number, each in enumerate(case.outlet)
+        }
+        self.outlets |= {f"patch.{name}": Opening(case, each) for name, each in case.drains.items()}
         self._summary: tuple[int, tuple[float, ...]] = (-1, ())  # number that left, and what their times gave
 
     @classmethod
     def is_in(cls, case: Case) -> bool:
-        """Whether the case has a feed or an outlet."""
-        return bool(case.feed or case.outlet)
+        """Whether the case has a feed, an outlet, or an opening through which particles leave."""
+        return bool(case.feed) or _drained(case)
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
         """What the particles of a case with feeds or outlets remember."""
         entered = ENTERED if case.feed else replace(ENTERED, initial=0.0)
-        return ((LANDED,) if case.feed else ()) + ((entered,) if case.outlet else ())
+        return ((LANDED,) if case.feed else ()) + ((entered,) if _drained(case) else ())
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
@@ -97,11 +103,10 @@ class Feeds(CaseFeature):
         if self.outlets and self.feeds:
             entered = solver.particles[ENTERED.name]
             entered[np.isinf(entered)] = solver.time
-        for number, outlet in enumerate(self.outlets):
-            owned = solver.particles.without_ghosts()
-            if solver.communicator.all(outlet.takes(owned.position)):
+        for name, outlet in self.outlets.items():
+            if solver.communicator.all(outlet.takes(solver.particles.without_ghosts())):
                 raise RunFailed(
-                    f"t = {solver.time:.6g} s: the last particles have reached outlet.{number}, and a run needs at "
+                    f"t = {solver.time:.6g} s: the last particles have reached {name}, and a run needs at "
                     "least one; end it earlier with run.until, or feed more"
                 )
             outlet(solver)
@@ -119,7 +124,7 @@ class Feeds(CaseFeature):
     @property
     def residence_times(self) -> np.ndarray:
         """How long each particle that has left was there, where this is known (n,) [s]."""
-        return np.concatenate([np.zeros(0), *(each.times for each in self.outlets)])
+        return np.concatenate([np.zeros(0), *(each.times for each in self.outlets.values())])
 
     @property
     def of_residence_times(self) -> tuple[float, ...]:
@@ -134,7 +139,7 @@ class Feeds(CaseFeature):
     @property
     def removed(self) -> tuple[int, float]:
         """Number and mass of the particles that have left [-], [kg]."""
-        return sum(each.left for each in self.outlets), sum(each.mass for each in self.outlets)
+        return sum(each.left for each in self.outlets.values()), sum(each.mass for each in self.outlets.values())
 
     def checkpoint(self) -> dict[str, Any]:
         """What feeds and outlets have done so far."""
@@ -149,7 +154,38 @@ class Feeds(CaseFeature):
     def _by_name(self) -> Iterator[tuple[str, Feed | ParticleOutlet]]:
         """All feeds and outlets by name."""
         yield from ((f"feed_{number}", each) for number, each in enumerate(self.feeds))
-        yield from ((f"outlet_{number}", each) for number, each in enumerate(self.outlets))
+        yield from ((name.replace(".", "_"), each) for name, each in self.outlets.items())
+
+
+class Opening(ParticleOutlet):
+    """Removes and counts the particles that touch the wall within a patch.
+
+    case   with the vessel or column
+    patch  through which they leave
+    """
+
+    def __init__(self, case: Case, patch: CasePatch) -> None:
+        super().__init__()
+        self._case, self._patch, (self._axis, high) = case, patch, PLANES[patch.side]
+        self._outward, self._middle = 1.0 if high else -1.0, 0.5 * case.column.size[self._axis]
+        self._to_wall = self._middle  # of a flat one
+        self._flat = patch not in case.openings or not case.vessel or bool(case.vessel.size)
+        if patch in case.openings and case.vessel and self._flat:
+            self._to_wall = float(case.vessel.plan_in(case.column)[:, self._axis].max()) - self._middle
+
+    def takes(self, particles: Particles) -> np.ndarray:
+        """Which particles touch the wall, and lie within the outline of the patch as a whole (N,) bool."""
+        at, radius, (first, second) = particles.position, particles.radius, along(self._patch.side)
+        inside = self._patch.holds(at[:, first], at[:, second], middle_of(self._case, self._patch.side), radius)
+        outward, reach = self._outward * (at[:, self._axis] - self._middle), (1.0 + TOUCHING) * radius
+        if self._flat:
+            return np.asarray(inside & (outward + reach >= self._to_wall))
+        return np.asarray(inside & (outward > 0.0) & (self._case.beyond_the_side(at, reach) >= 0.0))
+
+
+def _drained(case: Case) -> bool:
+    """Whether particles leave during a run."""
+    return bool(case.outlet or case.drains)
 
 
 def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
@@ -169,7 +205,7 @@ def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
         seed=(case.bed.seed, number, _FED),
         begin=given.begin,
         end=math.inf if given.end is None else given.end,
-        finish=_fresh(None if given.species is None else names.index(given.species), bool(case.outlet)),
+        finish=_fresh(None if given.species is None else names.index(given.species), _drained(case)),
     )
 
 

@@ -164,6 +164,31 @@ class Together:
         return found[0], found[1], found[2]
 
 
+@dataclass(frozen=True)
+class Joined:
+    """The fluid within several walls, which open into each other: where one distance is positive.
+
+    walls  of any kind
+    """
+
+    walls: tuple[Surface, ...]
+
+    def distance(self, x: Array, y: Array, z: Array) -> Array:
+        """See `Surface.distance`; in the mouth between two of them it is that to the wall that is farther away."""
+        return reduce(np.maximum, (wall.distance(x, y, z) for wall in self.walls))
+
+    def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        """See `Surface.velocity`: that of the wall whose distance counts."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+        farthest, found = np.full(shape, -np.inf), [np.zeros(shape) for _ in range(3)]
+        for wall in self.walls:
+            away = wall.distance(x, y, z)
+            for d, component in enumerate(wall.velocity(x, y, z)):
+                found[d] = np.where(away > farthest, component, found[d])
+            farthest = np.maximum(farthest, away)
+        return found[0], found[1], found[2]
+
+
 def cylinder(
     centre: Sequence[float], radius: float, axis: int = 2, *, inside: bool = True, spin: float = 0.0
 ) -> Turned:

@@ -153,13 +153,13 @@ class ParticleOutlet:
             self._times = [np.concatenate(self._times)]
         return self._times[0]
 
-    def takes(self, position: np.ndarray) -> np.ndarray:
-        """Which positions (N, 3) [m] are removed (N,) bool."""
-        return _inside(position, self.low, self.high) == self.inside
+    def takes(self, particles: Particles) -> np.ndarray:
+        """Which particles are removed (N,) bool."""
+        return _inside(particles.position, self.low, self.high) == self.inside
 
     def __call__(self, run: ParticleSolver) -> int:
         """Remove the particles that have left; returns their number."""
-        gone = run.remove(self.takes(run.particles.position))
+        gone = run.remove(self.takes(run.particles))
         left = run.communicator.sum(gone.count)
         self.left += left
         self.mass += run.communicator.sum(gone.mass)

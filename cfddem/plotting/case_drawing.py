@@ -10,6 +10,8 @@ import numpy as np
 from cfddem.backend.errors import CfddemError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.liquid import Spray
+from cfddem.case.openings import outline
+from cfddem.case.patches import ENDS, PLANES, CasePatch, lengths_of, middle_of
 from cfddem.case.schema import Case
 from cfddem.case.wall_geometry import extent, triangles
 from cfddem.case.walls import CaseWall
@@ -168,9 +170,13 @@ def _inflow(axes: Axes, case: Case) -> None:
 
 
 def _patches(axes: Axes, case: Case) -> None:
-    """Patches of floor and lid as thick lines with their names: blue where fluid enters, red where it leaves."""
+    """Patches as thick lines with their names, or as outlines on the sides that one looks at: blue where fluid enters,
+    red where it leaves."""
     width, _, height = case.column.size
     for number, (name, patch) in enumerate(case.patches.items()):
+        if patch.side not in ENDS:
+            _beside(axes, case, name, patch)
+            continue
         middle = patch.centre[0] if patch.centre else 0.5 * width
         half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
         z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
@@ -178,9 +184,24 @@ def _patches(axes: Axes, case: Case) -> None:
         for side in (-1.0, 1.0):
             x = middle + side * inner, middle + side * half
             axes.plot(x, [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
-        words = f"{name} {patch.highest:.3g} m/s" if patch.kind == "inlet" else name
+        words = f"{name} {patch.highest:.3g} m/s" if patch.brings else name
         lower = (-0.04 if patch.side == "floor" else 0.02) * height * (1.0 + number % 2)
         axes.text(middle, z + lower, words, color=colour, fontsize=9.5, ha="center", va="center", **LEGIBLE)
+
+
+def _beside(axes: Axes, case: Case, name: str, patch: CasePatch) -> None:
+    """A patch of a side, as `_patches`."""
+    colour = {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
+    if patch.shape == "whole":
+        first, second = lengths_of(case, patch.side)
+        at = np.array([[0.0, 0.0], [first, 0.0], [first, second], [0.0, second]])
+    else:
+        at = outline(patch, middle_of(case, patch.side))
+    axis, high = PLANES[patch.side]
+    x, z = (at[:, 0], at[:, 1]) if axis == 1 else (np.full(len(at), case.column.width * high), at[:, 1])
+    axes.plot([*x, x[0]], [*z, z[0]], color=colour, linewidth=1.6 if axis == 1 else 4.0, solid_capstyle="butt")
+    words = f"{name} {patch.highest:.3g} m/s" if patch.brings else name
+    axes.text(x.mean(), z.max(), words, color=colour, fontsize=9.5, ha="center", va="bottom", **LEGIBLE)
 
 
 def _box(axes: Axes, corner: Any, size: Any, name: str, colour: str) -> None:

@@ -160,9 +160,9 @@ def mean_inlet_velocity(case: Case) -> float:
     if (case.column.ends != "flow" and not case.patch) or case.around is NO_FLUID:
         return 0.0
     on_floor = [each for each in case.patches.values() if each.side == "floor"]
-    closed = case.column.ends != "flow" or any(each.kind != "inlet" and each.shape == "whole" for each in on_floor)
+    closed = case.column.ends != "flow" or any(not each.brings and each.shape == "whole" for each in on_floor)
     inlet = 0.0 if closed else case.bed.highest_inlet_velocity
-    of_floor = [each for each in on_floor if each.kind == "inlet"]
+    of_floor = [each for each in on_floor if each.brings]
     if of_floor:
         shares = [open_area_of(case, each) / max(case.floor_area, 1e-300) for each in of_floor]
         entering = sum(each.highest * share for each, share in zip(of_floor, shares))

@@ -64,7 +64,9 @@ def is_compared(case: Case) -> bool:
         and case.column.ends == "flow"
         and isinstance(inlet, float)
         and inlet > 0.0
-        and not (case.bed.jets or case.bed.fixed or case.bed.species or case.wall or case.feed or case.outlet)
+        and not (
+            case.bed.jets or case.bed.fixed or case.bed.species or case.wall or case.feed or case.outlet or case.drains
+        )
         and abs(case.laws.gravity[2]) > 0.0
     )
 

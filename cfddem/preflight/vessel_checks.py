@@ -1,4 +1,4 @@
-"""Checks of a vessel and of the patches of floor and lid: whether particles and cells fit, and patches are reached."""
+"""Checks of a vessel and of the patches of a case: whether particles and cells fit, and patches are reached."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cfddem.case.patches import PLACES, CasePatch, on_the_side, open_share_of
+from cfddem.case.patches import ENDS, PLACES, CasePatch, along, on_the_side, open_share_of
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue, percent
 
 FEWEST_ACROSS = 4.0
 """Cells across the narrowest part of a vessel, below which its flow has no profile [-]."""
+
+FEWEST_OF_OPENING = 2.0
+"""Cells across an opening in the wall of a vessel, below which walls take much of its flow [-]."""
 
 MOSTLY = 0.99
 """Share of a patch that must be open to the fluid for no warning [-]."""
@@ -49,7 +52,7 @@ def check_vessel(case: Case) -> Iterator[Issue]:
 
 
 def check_patches(case: Case) -> Iterator[Issue]:
-    """Check that patches lie on the open part of floor or lid."""
+    """Check that patches lie on the open part of floor or lid, and that cells resolve openings in a vessel."""
     of_lid = {name: each for name, each in case.patch.items() if each.side == "lid"}
     leaves = case.column.ends == "flow" and _is_open(case, [*of_lid.values()])
     if case.fastest_inflow > 0.0 and of_lid and not leaves and "outlet" not in {e.kind for e in case.patch.values()}:
@@ -59,6 +62,9 @@ def check_patches(case: Case) -> Iterator[Issue]:
             'make them smaller, or give a patch of kind = "outlet"',
         )  # fmt: skip
     for name, patch in case.patch.items():
+        if patch.side not in ENDS:
+            yield from _check_opening(case, name, patch)
+            continue
         share = open_share_of(case, patch)
         if share == 0.0:
             end = 0 if patch.side == "floor" else -1
@@ -74,6 +80,25 @@ def check_patches(case: Case) -> Iterator[Issue]:
                 f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and {outside}",
                 "make it smaller, or move its centre",
             )  # fmt: skip
+
+
+def _check_opening(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
+    """Check that cells resolve an opening in the wall of a vessel."""
+    spacing = _spacing(case)
+    edges = patch.size or 2 * (patch.diameter or math.inf,)
+    narrow = min(edge / spacing[d] for edge, d in zip(edges, along(patch.side)))
+    if patch in case.openings and narrow < FEWEST_OF_OPENING:
+        yield Issue(
+            "warning", f"patch.{name}",
+            f"{narrow:.2g} cells across; the flow through an opening in a vessel needs at least {FEWEST_OF_OPENING:g}",
+            "make it larger, or the cells smaller",
+        )  # fmt: skip
+
+
+def _spacing(case: Case) -> tuple[float, float, float]:
+    """Edges of a cell along x, y, z [m]."""
+    cell = case.column.cell
+    return cell if isinstance(cell, tuple) else (cell, cell, cell)
 
 
 def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:

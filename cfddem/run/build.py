@@ -15,6 +15,7 @@ from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.liquid import Bond
 from cfddem.case.materials import pair_overrides
 from cfddem.case.particle_properties import SPECIES
+from cfddem.case.patch_faces import SIDE_OF
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.case.vessel_surface import corners_in
@@ -288,7 +289,7 @@ def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
         conditions |= {"z_low": NoSlip(), "z_high": NoSlip()}
     else:
         conditions |= {"z_low": _inlet(case), "z_high": Outlet()}
-    for name, side in (("z_low", "floor"), ("z_high", "lid")):
+    for name, side in SIDE_OF.items():
         conditions[name] = with_patches(case, side, conditions[name])
     return conditions
 

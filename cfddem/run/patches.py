@@ -1,4 +1,4 @@
-"""Patches of floor and lid as conditions of the fluid: the flow through a patch is its velocity times its area.
+"""Patches of floor, lid and sides as conditions of the fluid: the flow through a patch is its velocity times its area.
 
 Faces of cells do not follow the edge of a disc: through one that a patch covers in part, that part of the flow enters.
 """
@@ -19,7 +19,7 @@ from cfddem.fluid.grid import Array, Region
 def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Condition | list[Condition]:
     """The conditions of a side with the patches of a case.
 
-    side    "floor" or "lid"
+    side    as a patch names it
     base    conditions without patches
     errors  InputError for a patch that covers no opening
     """
@@ -27,15 +27,18 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
     if not found.patches:
         return base
     listed = base if isinstance(base, list) else [base]
+    if any(each.shape == "whole" and not each.brings for each in found.patches.values()):
+        listed = [NoSlip()]  # nothing of the side itself is left
     made, inlets = [*listed], found.inlets
     for name, each in found.patches.items():
-        if each.kind != "inlet":
-            where = _at(case, found.whole(name))
-            made.append(Outlet(each.pressure, where=where) if each.kind == "outlet" else NoSlip(where=where))
+        if not each.brings:
+            where = _at(case, side, found.whole(name))
+            made.append(NoSlip(where=where) if each.kind == "wall" else Outlet(each.pressure or 0.0, where=where))
         elif name == inlets[-1]:  # all inlets at once: two may share a face
             speeds = [(found.patches[one].speed, found.shares[one]) for one in inlets]
             entering = np.sum([share for _, share in speeds], axis=0) > 0.0
-            made.append(Inlet(_velocity(case, speeds, _before(listed[0]), found.rest), where=_at(case, entering)))
+            velocity = _velocity(case, side, speeds, _before(listed[0]), found.rest)
+            made.append(Inlet(velocity, where=_at(case, side, entering)))
     return made
 
 
@@ -48,22 +51,26 @@ def _before(condition: Condition) -> Callable[[float], float]:
 
 
 def _velocity(
-    case: Case, speeds: Sequence[tuple[Callable[[float], float], Array]], flow: Callable[[float], float], rest: Array
+    case: Case,
+    side: str,
+    speeds: Sequence[tuple[Callable[[float], float], Array]],
+    flow: Callable[[float], float],
+    rest: Array,
 ) -> Callable[[Array, Array, Array, float], Array]:
     """Inward speed at faces: that of every patch by its share, and that of the floor by the rest."""
 
     def velocity(x: Array, y: Array, z: Array, time: float) -> Array:
-        face = face_at(case, x, y)
+        face = face_at(case, side, x, y, z)
         entering: Any = sum(speed(time) * share[face] for speed, share in speeds)
         return np.asarray(entering + flow(time) * rest[face])
 
     return velocity
 
 
-def _at(case: Case, chosen: np.ndarray) -> Region:
-    """The faces of a side that are chosen (ny, nx)."""
+def _at(case: Case, side: str, chosen: np.ndarray) -> Region:
+    """The faces of a side that are chosen."""
 
     def where(x: Array, y: Array, z: Array) -> np.ndarray:
-        return np.asarray(chosen[face_at(case, x, y)])
+        return np.asarray(chosen[face_at(case, side, x, y, z)])
 
     return where

@@ -221,6 +221,18 @@ def test_a_hot_inlet_through_a_patch_heats_the_particles_of_a_cone_and_the_balan
     assert found["mean_temperature"] > 300.0
 
 
+def test_a_hot_inlet_in_the_side_of_a_cone_brings_its_heat_and_the_balances_hold() -> None:
+    side = {"kind": "inlet", "side": "y_high", "shape": "box", "centre": [0.032, 0.06], "size": [0.02, 0.015],
+            "velocity": 1.5}  # fmt: skip
+    given = {"patch.side": side, "heat.patch_temperature": {"side": 350.0}}
+    simulation = Simulation(Case.from_text(CASE, "c.toml", given))
+    for _ in range(10):
+        simulation.step()
+    found, seconds = row(simulation), simulation.fluid.time
+    assert found["heat_in"] == pytest.approx(1200.0 * 1.5 * 0.02 * 0.015 * 50.0 * seconds, rel=1e-6)
+    assert found["heat_imbalance"] < 1e-12 and found["vapour_imbalance"] < 1e-12
+
+
 def test_a_temperature_of_no_inlet_is_refused_with_the_inlets() -> None:
     for key in ("heat.patch_temperature", "vapour.patch_fraction"):
         with pytest.raises(InputError, match=rf"{key}.jet: must be one of the inlets nozzle, annulus"):

@@ -44,12 +44,12 @@ def discharge(run: RunData, case: Case) -> Discharge:
     """Discharge of a run, from the mass that its outlet has removed."""
     begin, end = case.run.average_from or 0.5 * case.run.until, case.run.until
     middle = 0.5 * (begin + end)
-    rates = [_slope(run, *span) for span in ((begin, end), (begin, middle), (middle, end))]
+    rates = [removal_rate(run, *span) for span in ((begin, end), (begin, middle), (middle, end))]
     return Discharge(rates[0], (rates[1], rates[2]), beverloo(case))
 
 
-def _slope(run: RunData, begin: float, end: float) -> float:
-    """Removed mass per time [kg/s]."""
+def removal_rate(run: RunData, begin: float, end: float) -> float:
+    """Mass that outlets remove per time, between two times [kg/s]."""
     time = run.history["time"]
     inside = (time >= begin) & (time <= end)
     return float(np.polyfit(time[inside], run.history["removed_mass"][inside], 1)[0])

@@ -1,0 +1,113 @@
+"""Discharge of a hopper against and with air through its orifice, beside Beverloo's law and its correction for air.
+
+>>> from cfddem.case.gallery import gallery
+>>> round(beverloo(gallery()["hopper-with-air"]), 3)
+0.173
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cfddem.case.bed import POURED_SOLID_FRACTION
+from cfddem.case.schema import Case
+from cfddem.io.reading import RunData, open_run
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, RED, label, legend, panels, save
+from closures import discharge as laws_of_discharge
+from scenarios.beds.hopper.study import removal_rate
+from scenarios.beds.vessel_slice import draw_spheres, draw_vessel
+
+COLOURS = (BLUE, ORANGE, RED)
+"""Of runs, in the order in which they are drawn."""
+
+
+@dataclass(frozen=True)
+class Discharge:
+    """Mass flow out of the hopper, and what drives it beside gravity."""
+
+    pressure: float  # of the air below the orifice [Pa]
+    rate: float  # over the averaging window [kg/s]
+    halves: tuple[float, float]  # over its two halves [kg/s]
+    air: float  # superficial velocity of the air through the orifice, upward [m/s]
+    gradient: float  # of the pressure in the orifice, positive where it pushes the beads down [Pa/m]
+    factor: float  # that this gradient makes by the law, over the discharge without it [-]
+
+
+def case_of(run: RunData) -> Case:
+    """The case of a run."""
+    return Case.from_text(run.case_text, finished=True)
+
+
+def bulk_of(case: Case) -> float:
+    """Density of a poured bed [kg/m3]."""
+    return POURED_SOLID_FRACTION * case.solid.density
+
+
+def beverloo(case: Case) -> float:
+    """Discharge of the cone, the second piece of the vessel, without air: by Beverloo with a correction for its angle
+    [kg/s]."""
+    (low, orifice), (high, width) = case.line[1:3]
+    flat = laws_of_discharge.beverloo(bulk_of(case), 2.0 * orifice, case.bed.diameter, math.hypot(*case.laws.gravity))
+    return flat * laws_of_discharge.cone_factor((width - orifice) / (high - low))
+
+
+def discharge(run: RunData, case: Case) -> Discharge:
+    """Discharge of a run, from the mass that has left through its floor."""
+    begin, end = case.run.average_from or 0.5 * case.run.until, case.run.until
+    middle = 0.5 * (begin + end)
+    rate, *halves = (removal_rate(run, *span) for span in ((begin, end), (begin, middle), (middle, end)))
+    late = [n for n, time in enumerate(run.times) if time >= begin]
+    gradient = float(np.mean([_at_orifice(run, case, n)[0] for n in late]))
+    air = float(np.mean([_at_orifice(run, case, n)[1] for n in late]))
+    factor = laws_of_discharge.air_factor(gradient / (bulk_of(case) * math.hypot(*case.laws.gravity)))
+    return Discharge(case.patch["orifice"].pressure or 0.0, rate, (halves[0], halves[1]), air, gradient, factor)
+
+
+def _at_orifice(run: RunData, case: Case, n: int) -> tuple[float, float]:
+    """Pressure gradient [Pa/m] and superficial velocity [m/s] in the orifice, its four middle cells, in a snapshot.
+
+    The orifice is the lower end of the cone, a face between two cells.
+    """
+    assert run.grid is not None
+    nx, ny, _ = run.grid.cells
+    above = round(case.line[1][0] / run.grid.spacing[2])
+    middle = np.s_[above - 1 : above + 1, ny // 2 - 1 : ny // 2 + 1, nx // 2 - 1 : nx // 2 + 1]
+    low, high = run.fluid("pressure", n)[middle].mean(axis=(1, 2))
+    flow = run.fluid("voidage", n)[middle] * run.fluid("velocity", n)[middle][..., 2]
+    return float(high - low) / run.grid.spacing[2], float(flow.mean())
+
+
+# ---------------------------------------------------------------- figure of the hopper
+
+
+def figure(runs: Sequence[RunData], path: Path) -> None:
+    """Beads near the middle plane of some runs at the end, and the mass that has left against time."""
+    drawn, axes = panels(len(runs) + 1, width=11.0, height=4.0, width_ratios=[*[1.0] * len(runs), 1.7])
+    curve = axes[-1]
+    for run, axis, colour in zip(runs, axes, COLOURS):
+        case = case_of(run)
+        found = discharge(run, case)
+        draw_spheres(axis, run, case, case.run.until, reach=0.75, size=14.0, fastest=0.6)
+        draw_vessel(axis, case, 0.09)
+        axis.set_title(f"{found.pressure:g} Pa", fontsize=9.5, color=colour)
+        words = f"{found.pressure:g} Pa: {found.rate:.3g} kg/s"
+        curve.plot(run.history["time"], 1e3 * run.history["removed_mass"], color=colour, label=words)
+    law, ends = beverloo(case_of(runs[0])), np.array([0.0, case_of(runs[0]).run.until])
+    curve.plot(ends, 1e3 * law * ends, color=GREY, ls="--", label=f"Beverloo: {law:.3g} kg/s")
+    label(curve, "time", "s", "mass that has left", "g")
+    legend(curve)
+    save(drawn, path)
+
+
+if __name__ == "__main__":
+    every = [open_run(folder) for folder in sys.argv[2:]]
+    for each in every:
+        print(discharge(each, case_of(each)))
+    print(f"without air, by Beverloo: {beverloo(case_of(every[0])):.4g} kg/s")
+    figure(every, Path(sys.argv[1]))

@@ -1,0 +1,229 @@
+"""Openings in the sides of vessels and boxes: flow by velocity, mass flow and pressure, and particles that leave."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from example_case import GLASS
+
+from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
+from cfddem.case.openings import outline
+from cfddem.case.schema import Case
+from cfddem.features.feeds import Opening
+from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.state import make_particles
+from cfddem.plotting.case_drawing import case_drawing
+from cfddem.plotting.curves import save
+from cfddem.preflight.summary import preflight
+from cfddem.run.build import boundaries_of
+from cfddem.run.history import row
+from cfddem.run.simulation import Simulation
+
+TEXT = (
+    """
+[fluid]
+density = 1.2
+viscosity = 1.8e-5
+
+[column]
+width = 0.08
+height = 0.12
+cell = 0.01
+ends = "closed"
+
+[vessel]
+shape = "cylinder"
+
+[patch.air]
+kind = "inlet"
+side = "x_low"
+shape = "disc"
+diameter = 0.03
+centre = [0.043, 0.031]
+velocity = 2.0
+
+[patch.out]
+kind = "outlet"
+side = "y_high"
+shape = "box"
+centre = [0.037, 0.08]
+size = [0.033, 0.022]
+
+[bed]
+diameter = 4e-3
+count = 10
+start = "suspended"
+
+[run]
+until = 0.1
+reference_speed = 2.0
+"""
+    + GLASS
+)
+
+VESSELS: dict[str, Any] = {
+    "round": {"shape": "cylinder"},
+    "cone": {"shape": "cone", "radius": 0.03, "length": 0.05},
+    "narrow box": {"shape": "box", "size": [0.06, 0.07]},
+    "column": None,
+}
+DRIVEN: dict[str, Any] = {
+    "velocity": {},
+    "mass flow": {"patch.air.velocity": None, "patch.air.mass_flow": 1e-3},
+    "pressure": {"patch.air.velocity": None, "patch.air.pressure": 5.0},
+}
+DISC = math.pi * 0.015**2
+
+
+def made(**given: Any) -> Case:
+    return Case.from_text(TEXT, "c.toml", {name.replace("__", "."): value for name, value in given.items()})
+
+
+def flow_in(case: Case, steps: int = 30, tolerance: float = 1e-13) -> tuple[FluidSolver, list[np.ndarray]]:
+    """A fluid after some steps, and its flow through all faces normal to x, y, z [m3/s]."""
+    grid, fluid = grid_of(case), case.required_fluid
+    flow = FluidSolver(
+        grid, boundaries_of(case), density=fluid.density, viscosity=fluid.viscosity, tolerance=tolerance
+    )  # fmt: skip
+    for _ in range(steps):
+        flow.step(min(2e-3, 0.5 * flow.largest_step().step))
+    return flow, [flow.volume_flux(d) * grid.face_area(d) for d in range(3)]
+
+
+# ---------------------------------------------------------------- flow
+
+
+@pytest.mark.parametrize("driven", DRIVEN.values(), ids=DRIVEN)
+@pytest.mark.parametrize("vessel", VESSELS.values(), ids=VESSELS)
+def test_what_enters_through_a_side_leaves_through_another_to_round_off(vessel: Any, driven: Any) -> None:
+    """A given flow is that of the true disc; in every cell mass is kept to 1e-12 of the largest flux."""
+    x, y, z = flow_in(Case.from_text(TEXT, "c.toml", {"vessel": vessel} | driven))[1]
+    balance = np.diff(x, axis=2) + np.diff(y, axis=1) + np.diff(z, axis=0)
+    largest, entering = np.abs(x).max(), x[:, :, 0].sum()
+    print(f"in {entering:.6g} m3/s, in a cell {np.abs(balance).max() / largest:.2g} of the largest flux are lost")
+    assert np.abs(balance).max() < 1e-12 * largest
+    assert y[:, -1].sum() == pytest.approx(entering, rel=1e-12) and entering > 1e-4
+    assert not z[[0, -1]].any() and not x[:, :, -1].any() and not y[:, 0].any()
+    if "patch.air.mass_flow" in driven:
+        assert entering == pytest.approx(1e-3 / 1.2, rel=1e-12)
+    elif "patch.air.pressure" not in driven:
+        assert entering == pytest.approx(2.0 * DISC, rel=1e-9 if vessel else 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [("floor", "lid"), ("lid", "floor"), ("x_low", "x_high"), ("y_high", "y_low")]
+)
+def test_a_pressure_is_that_of_fluid_at_rest_outside(low: str, high: str) -> None:
+    """Through the whole of two opposite sides, by Bernoulli: p = rho u2 / 2 once the flow is steady."""
+    sides = {
+        "patch.air": {"kind": "inlet", "side": low, "pressure": 3.0},
+        "patch.out": {"kind": "outlet", "side": high},
+    }
+    column = {"width": 0.04, "height": 0.04, "cell": 0.01, "ends": "closed"}
+    case = made(vessel=None, fluid__viscosity=1e-9, column=column, **sides)
+    flow, through = flow_in(case, 400, 1e-10)
+    axis = 2 if low in ("floor", "lid") else "xy".index(low[0])
+    speed = math.sqrt(2.0 * 3.0 / 1.2) * (1.0 if low in ("floor", "x_low") else -1.0)
+    assert through[axis].sum() / (grid_of(case).cells[axis] + 1) == pytest.approx(speed * 0.04**2, rel=2e-3)
+    assert flow.pressure.max() < 3.0
+
+
+def test_an_opening_above_atmospheric_pressure_draws_fluid_in_and_one_below_it_lets_it_out() -> None:
+    """An outlet of 4 Pa beside one at 0 Pa."""
+    x, y, _ = flow_in(made(patch__air__kind="outlet", patch__air__velocity=None, patch__air__pressure=-4.0))[1]
+    assert x[:, :, 0].sum() < -1e-4 and y[:, -1].sum() == pytest.approx(x[:, :, 0].sum(), rel=1e-12)
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"patch.air.centre": [0.043, 0.005]}, "patch.air.centre.*in the wall of the vessel, off its corners"),
+        ({"patch.air.centre": [0.07, 0.03]}, r"patch.air.centre.*in the wall of the vessel.*y = 0.055 to 0.085 m"),
+        ({"vessel": None, "patch.air.centre": [0.07, 0.03]}, "patch.air.centre.*in the side, off its corners"),
+        ({"patch.air.centre": [0.9, 0.9]}, r"patch.air.centre = \(0.9, 0.9\): must be such that.*move it"),
+        ({"vessel.shape": "cone", "vessel.radius": 0.005, "vessel.length": 0.12}, "patch.air.centre.*in the wall"),
+        ({"patch.out": {"kind": "outlet", "side": "y_high"}}, "patch.out.shape.*box or disc"),
+        ({"patch.out.kind": "wall"}, "patch.out.kind.*inlet or outlet|together with an outlet"),
+        ({"patch.air.side": "x_hihg"}, "patch.air.side.*one of floor, lid, x_low"),
+        ({"patch.out.kind": "inlet", "patch.out.velocity": 1.0}, "patch.*together with an outlet"),
+        ({"patch.air.velocity": None}, "patch.air.velocity: must be given for an inlet.*pressure"),
+        ({"patch.air.pressure": 3.0}, "patch.air.pressure.*left out where there is a velocity"),
+        ({"vessel.spin": 3.0}, "vessel.spin.*left out beside patch.air"),
+        ({"vessel": {"shape": "box", "size": [0.05, 0.05], "turn": 30.0}}, "patch.air.side.*a box that is turned"),
+        ({"vessel": None, "column.shape": "cylinder"}, "patch.air.side.*floor or lid of a column with steps"),
+        ({"vessel": None, "column.sides": "periodic"}, "patch.air.side.*a side that is not periodic"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_an_opening_that_cannot_be_is_refused_in_a_line(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said) as refusal:
+        Case.from_text(TEXT, "c.toml", given)
+    assert len(str(refusal.value)) < 400
+
+
+def test_an_opening_smaller_than_a_cell_is_no_opening_and_the_check_says_so() -> None:
+    small = made(patch__air__diameter=0.012)
+    said = [each.reason for each in preflight(small).issues if each.key == "patch.air"]
+    assert any("1.2 cells across" in each for each in said), said
+    assert not [each for each in preflight(made()).issues if each.key.startswith("patch")]
+
+
+def test_openings_are_in_the_text_and_the_drawing_of_a_case(tmp_path: Path) -> None:
+    case = made()
+    assert Case.from_text(case.to_toml()) == case
+    save(case_drawing(case), tmp_path / "case.png")
+    assert (tmp_path / "case.png").stat().st_size > 1000
+
+
+# ---------------------------------------------------------------- particles
+
+
+@pytest.mark.parametrize("name", VESSELS)
+def test_particles_leave_where_they_touch_the_wall_and_lie_within_the_opening(name: str) -> None:
+    """Of spheres all around the vessel, at its wall or off it, those at the disc on the side of low x alone."""
+    case = Case.from_text(TEXT, "c.toml", {"vessel": VESSELS[name], "patch.air.particles": "leave"})
+    radius, random = 2e-3, np.random.default_rng(3)
+    place = random.uniform((0.0, 0.0, radius), (0.08, 0.08, 0.12 - radius), (200_000, 3))
+    if name in ("round", "cone"):
+        away = case.beyond_the_side(place, radius)
+    else:
+        half = np.array([0.03, 0.035] if name == "narrow box" else [0.04, 0.04])
+        away = (np.abs(place[:, :2] - 0.04) - half + radius).max(axis=1)
+    place, away = place[away < 0.0], away[away < 0.0]
+    taken = Opening(case, case.patch["air"]).takes(make_particles(place, radius, 1000.0))
+    beside = np.hypot(place[:, 1] - 0.043, place[:, 2] - 0.031)
+    if name in ("round", "cone"):
+        touches = (away > -0.05 * radius) & (place[:, 0] < 0.04)
+    else:
+        touches = place[:, 0] < 0.04 - half[0] + 1.05 * radius
+    assert 10 < taken.sum() < 0.05 * len(place)
+    wrong = taken != (touches & (beside < 0.015 - radius))
+    assert wrong.sum() <= (2 if name == "cone" else 0)  # across a cone distances differ by its slope
+
+
+def test_a_bed_overflows_a_weir_and_the_particles_are_counted_with_their_times() -> None:
+    """Two spheres roll to the side, one above the sill and one below it; a third one rests."""
+    weir = {"kind": "outlet", "side": "x_high", "shape": "box", "centre": [0.02, 0.03], "size": [0.04, 0.02],
+            "particles": "leave"}  # fmt: skip
+    case = made(
+        vessel=None, patch={"weir": weir}, run__until=0.05, fluid__viscosity=1e-9,
+        column={"width": 0.04, "height": 0.04, "cell": 0.01, "ends": "closed"},
+        laws={"gravity": [0.0, 0.0, 0.0], "drag": "none"},
+        bed={"diameter": 4e-3, "positions": [[0.03, 0.02, 0.03], [0.03, 0.02, 0.0219], [0.01, 0.02, 0.01]],
+             "start": "placed", "initial_velocity": [0.4, 0.0, 0.0]},
+    )  # fmt: skip
+    simulation = Simulation(case)
+    simulation.until(0.05)
+    found = row(simulation)
+    assert found["removed_count"] == 1 and simulation.particles.count == 2
+    assert found["residence_time"] == pytest.approx((0.008 - 1e-4) / 0.4, rel=0.02)
+    assert (simulation.particles.position[:, 0] < 0.038 + 1e-5).all()
+    assert outline(case.patch["weir"], (0.02, 0.02))[:, 1].min() == pytest.approx(0.02)
