@@ -43,11 +43,11 @@ def with_changes(values: dict[str, Any], changes: dict[str, Any]) -> Case:
     return Case.from_text("", overrides=values | {name.replace("__", "."): value for name, value in changes.items()})
 
 
-def in_a_stream(diameter: float, speed: float, until: float, heat: dict[str, Any], **changes: Any) -> Case:
+def in_a_stream(diameter: float, speed: float, until: float, thermal: dict[str, Any], **changes: Any) -> Case:
     """A sphere that is held in a stream, without drag.
 
     diameter, speed, until  of the sphere [m], of the stream [m/s], end of the run [s]
-    heat     keys of [heat]
+    thermal  keys of [heat]
     changes  of the case, with __ for the point
     """
     values: dict[str, Any] = {
@@ -55,7 +55,7 @@ def in_a_stream(diameter: float, speed: float, until: float, heat: dict[str, Any
         "bed": {"diameter": diameter, "positions": [(0.2, 0.2, 0.2)], "fixed": True, "inlet_velocity": speed},
         "laws": {"drag": None, "gravity": (0.0, 0.0, 0.0), "lubrication": "none"},
         "run": {"until": until, "reference_speed": speed, "fluid_step": 0.01},
-        "heat": heat,
+        "heat": thermal,
     }
     return with_changes(values, changes)
 
