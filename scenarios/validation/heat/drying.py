@@ -109,7 +109,7 @@ def stuck(curves: Curves) -> list[Row]:
 
 def _draw(folder: Path, curves: Curves) -> None:
     """Liquid, motion and the largest agglomerate of a wet bed that dries, with and without bonds."""
-    figure, axes = panels(3, width=12.0, height=4.0)
+    figure, axes = panels(3, width=11.0, height=4.0)
     for name, colour in (("without bonds", BLUE), ("with bonds", ORANGE)):
         run = {column: np.asarray(values) for column, (values, _) in curves[f"dried bed, {name}"].items()}
         time = 1e3 * run["time"]

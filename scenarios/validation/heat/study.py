@@ -23,7 +23,7 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 def _draw(folder: Path, curves: Curves) -> None:
     """Drops that shrink, hot seeds that cool, and a packed bed that cools."""
-    figure, (left, middle, right) = panels(3, width=12.0, height=4.0)
+    figure, (left, middle, right) = panels(3, width=11.0, height=4.0)
     colours = (BLUE, ORANGE, GREEN, GREY)
     for ((speed, fraction), measured), colour in zip(drops.SHRUNK.items(), colours):
         run = curves[f"fujita/{speed:g} m per s, vapour {fraction:g}"]
