@@ -1,4 +1,4 @@
-"""The rows of `cfddem validate drying` from made-up runs: what holds, and what is told to fail."""
+"""The rows of `cfddem validate drying` from made-up runs: which limits hold, and which fail."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def made_up(bonded_motion: float) -> object:
 
 
 @pytest.mark.parametrize("motion", [1e-6, 1e-3])
-def test_a_bed_with_bonds_fails_where_it_moves_and_a_late_end_is_told(
+def test_a_bed_with_bonds_fails_where_it_moves_and_a_late_end_fails(
     motion: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     time = np.linspace(0.1, 1.8, 18)
