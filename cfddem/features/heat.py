@@ -37,6 +37,9 @@ from cfddem.fluid.solver import FluidSolver
 RECEIVED = ("heat_from_fluid", "J")
 """Name and unit of the field with the heat that a particle received in the last step."""
 
+LEAST = 1e-3
+"""Change of the temperature of particles and fluid below which no heat counts as exchanged [K]."""
+
 OF_FLUID = CellField("temperature", "K", "temperature of the fluid")
 
 
@@ -151,14 +154,15 @@ class HeatExchange(CaseFeature):
     @property
     def imbalance(self) -> float:
         """Change of heat in the particles that the fluid did not give, or in the fluid that nothing gave, over that
-        exchanged [-]."""
+        exchanged, at least the heat of a thousandth of a kelvin [-]."""
         wrong, scale = abs(self.last - self.start - self.other - self.given), self.scale
         if self.cells is not None:
             sums = self.cells.sums
             brought = sums["inflow"] - sums["outflow"] + sums["walls"] + sums["displaced"] - self.given
             wrong = max(wrong, abs(self.cells.content - brought))
             scale += abs(sums["inflow"]) + abs(sums["walls"])
-        return wrong / scale if scale > 0.0 else 0.0
+        held = float(self.communicator.sum(self._capacity)) + (self.cells.capacity if self.cells else 0.0)
+        return wrong / max(scale, LEAST * held)
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""

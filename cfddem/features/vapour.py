@@ -24,6 +24,9 @@ from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
 from cfddem.fluid.scalar_conditions import ScalarSides
 
+LEAST = 1e-6
+"""Mass of vapour over that of the fluid below which nothing counts as given [-]."""
+
 OF_FLUID = CellField("vapour", "1", "mass fraction of the vapour in the fluid")
 
 
@@ -73,11 +76,12 @@ class Vapour(CaseFeature):
 
     @property
     def imbalance(self) -> float:
-        """Change of the vapour in the fluid that nothing gave, over what was given [-]."""
+        """Change of the vapour in the fluid that nothing gave, over what was given, at least a millionth of the fluid
+        [-]."""
         sums = self.cells.sums
         given = sums["inflow"] - sums["outflow"] + sums["displaced"] - self.received
         scale = self.scale + abs(sums["inflow"]) + abs(sums["outflow"])
-        return abs(self.cells.content - given) / scale if scale > 0.0 else 0.0
+        return abs(self.cells.content - given) / max(scale, LEAST * self.cells.capacity)
 
     def conductance(self, terms: Any) -> np.ndarray:
         """Conductance of the whole surface of every particle, by the law of heat transfer as Sherwood number (N,)

@@ -177,6 +177,12 @@ class Scalar:
         return float(total(weight * self.value) / total(weight))
 
     @property
+    def capacity(self) -> float:
+        """Capacity of all the fluid: rho c V [J/K], or its mass [kg]."""
+        held = self.fields.owned("stored") * self.flow.groups.volume
+        return float(self._amount * self.fluid.communicator.sum(held))
+
+    @property
     def content(self) -> float:
         """What the fluid holds above `kind.start`: its sum of the value times capacity [J] or [kg]."""
         held = self.fields.owned("stored") * self.flow.groups.volume * (self.value - self.kind.start)

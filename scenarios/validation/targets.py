@@ -34,6 +34,8 @@ TARGETS: dict[str, str] = {
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
     "sheared-films": "scenarios.validation.sheared_films.study",
+    "heat": "scenarios.validation.heat.study",
+    "drying": "scenarios.validation.heat.drying",
     "heated-bed": "scenarios.validation.heated_bed",
     "resolved": "scenarios.references.resolved_suspension.study",
 }

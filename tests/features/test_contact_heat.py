@@ -1,8 +1,4 @@
-"""Heat between particles, with walls and with the surroundings; the how-to page is docs/how-to/contact-heat.md.
-
-The two spheres are the tests of MFIX, legacy_tests/dem-tests/{contact-conduction, particle-fluid-particle-conduction,
-radiation}, of J. Musser; their exact solutions are those of the files usr2_des.f.
-"""
+"""Heat between particles, with walls and with the surroundings; the how-to page is docs/how-to/contact-heat.md."""
 
 from __future__ import annotations
 
@@ -24,106 +20,26 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from scenarios.validation import heated_bed
+from scenarios.validation.heat.spheres import COLD, GAS, HEAT, HOT, RADII, exact_cases, two_spheres
+from scenarios.validation.table import Row
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/contact-heat.md"
-CALORIE = 4.1868
-CALORIES = CALORIE * 100.0
-"""cal/s/cm/K in W/m/K."""
-
-COLD, HOT = 298.15, 453.15
-RADII = 3.3e-3
-"""Sum of the radii [m]."""
-
-HEAT: dict[str, Any] = {
-    "held": True,
-    "particle_temperature": {"cold": COLD, "hot": HOT},
-    "conductivity": {"light": 0.131453 * CALORIES, "heavy": 0.002008 * CALORIES},
-    "heat_capacity": {"light": 0.191204 * CALORIE * 1e3, "heavy": 0.013145 * CALORIE * 1e3},
-}
-"""Inputs of the tests, from calories and centimetres."""
-
-GAS = 1.239e-4 * CALORIES
 
 
-def case_of(gap: float, step: float, until: float, contacts: dict[str, Any] | None = None, **changes: Any) -> Case:
-    """Two spheres in vacuum above each other, `gap` apart [m]; changes with __ for the point."""
-    values: dict[str, Any] = {
-        "material.light": {"density": 420.0, "youngs_modulus": 1e7, "poisson": 0.25},
-        "material.heavy": {"density": 8850.0, "youngs_modulus": 1e7, "poisson": 0.25},
-        "column": {"width": 0.045, "depth": 0.02, "height": 0.0108, "cell": (0.015, 0.01, 0.0108)},
-        "bed": {
-            "species": {
-                "cold": {"material": "light", "diameter": 3e-3, "count": 1},
-                "hot": {"material": "heavy", "diameter": 3.6e-3, "count": 1},
-            },
-            "positions": [(0.005, 0.005, 0.005), (0.005 + RADII + gap, 0.005, 0.005)],
-        },
-        "laws": {"gravity": (0.0, 0.0, 0.0)},
-        "run": {"until": until, "fluid_step": step, "reference_speed": 0.1},
-        "contact_heat": HEAT | (contacts or {}),
-    }
-    return Case.from_text("", overrides=values | {name.replace("__", "."): value for name, value in changes.items()})
+@pytest.mark.parametrize("number", range(5))
+def test_spheres_follow_the_exact_solutions_of_mfix(number: int, exact: list[Row]) -> None:
+    """Within 0.1 % of the difference of temperature at the start, at all printed times."""
+    assert len(exact) == 5 and exact[number].verdict == "holds", exact[number]
 
 
-def temperatures(case: Case, times: set[float]) -> dict[float, tuple[float, float]]:
-    """Temperatures of both spheres by time [K]; the heat is balanced."""
-    simulation, found = Simulation(case), {}
-    for time in sorted(times):
-        simulation.until(time)
-        cold, hot = simulation.particles.temperature
-        found[time] = float(cold), float(hot)
-    assert simulation.feature(HeatExchangeOfContacts).imbalance < 1e-12
-    return found
-
-
-PUBLISHED: dict[str, tuple[dict[str, Any], dict[float, float], dict[float, float]]] = {
-    "contact": (
-        {"radius": "overlap_circle"},
-        {1.0: 299.73199, 10.0: 312.99221, 100.0: 382.62917, 500.0: 408.82180},
-        {1.0: 452.51802, 100.0: 419.40198, 500.0: 408.93846},
-    ),
-    "gap": (
-        {"contact": "none", "gap": "lens", "gas_conductivity": GAS},
-        {1.0: 304.19589, 10.0: 345.72254, 100.0: 408.50084},
-        {10.0: 434.14556},
-    ),
-    "radiation": (
-        {
-            "contact": "none",
-            "emissivity": {"light": 0.8, "heavy": 0.8},
-            "surroundings_temperature": 400.0,
-            "surroundings": "local",
-        },
-        {1.0: 302.74482, 10.0: 338.06780, 50.0: 394.96504},
-        {1.0: 450.58386, 10.0: 432.95174},
-    ),
-}
-"""Keys, and exact temperatures of the cold and the hot sphere by time [s], [K]."""
-
-SETUP = {"contact": (-1.33e-7, 0.5), "gap": (1.8e-4, 0.02), "radiation": (1.2e-3, 0.02)}
-"""Gap [m] and step [s]."""
-
-
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_two_spheres_follow_the_exact_solutions_of_mfix(name: str) -> None:
-    """Within 0.1 % of the difference between the hot and the cold sphere at the start, at all printed times.
-
-    The cell that both spheres see in the test of radiation is 15 x 10 x 3.6 mm, as in MFIX.
-    """
-    heat, cold, hot = PUBLISHED[name]
-    gap, step = SETUP[name]
-    flat = {"column__height": 0.0036, "column__cell": (0.015, 0.01, 0.0036)}
-    flat["bed__positions"] = [(0.004, 0.005, 0.0018), (0.0095, 0.005, 0.0018)]
-    case = case_of(gap, step, 500.0, heat, **(flat if name == "radiation" else {}))
-    found = temperatures(case, {*cold, *hot})
-    for time, value in cold.items():
-        assert abs(found[time][0] - value) < 1e-3 * (HOT - COLD), (time, found[time][0])
-    for time, value in hot.items():
-        assert abs(found[time][1] - value) < 1e-3 * (HOT - COLD), (time, found[time][1])
+@pytest.fixture(scope="module")
+def exact() -> list[Row]:
+    """Convection, contact, gap, radiation, and their balances."""
+    return exact_cases({})
 
 
 def test_a_step_far_too_long_ends_at_the_common_temperature_with_the_heat_conserved() -> None:
-    simulation = Simulation(case_of(-1.33e-7, 1e6, 1e7))
+    simulation = Simulation(two_spheres(-1.33e-7, 1e6, 1e7))
     heat = simulation.feature(HeatExchangeOfContacts)
     capacity = heat.capacity(simulation.particles)
     before = float(capacity @ simulation.particles.temperature)
@@ -142,7 +58,7 @@ def test_a_softened_contact_conducts_as_the_real_one_under_the_same_force() -> N
         soft = {"material.light.contact_modulus": softened, "material.heavy.contact_modulus": softened}
         changes = soft if softened else {}
         hard = {"material.light.youngs_modulus": 1e10, "material.heavy.youngs_modulus": 1e10}
-        case = case_of(-overlap, 1.0, 10.0, **{k.replace(".", "__"): v for k, v in (hard | changes).items()})
+        case = two_spheres(-overlap, 1.0, 10.0, **{k.replace(".", "__"): v for k, v in (hard | changes).items()})
         simulation = Simulation(case)
         simulation.step()
         heat = simulation.feature(HeatExchangeOfContacts)
@@ -154,7 +70,7 @@ def test_a_softened_contact_conducts_as_the_real_one_under_the_same_force() -> N
 def test_contacts_across_a_periodic_side_conduct_as_any_other() -> None:
     def warmed(x: float, **changes: Any) -> float:
         places = [(x, 0.005, 0.005), ((x + RADII - 1e-7) % 0.045, 0.005, 0.005)]
-        simulation = Simulation(case_of(0.0, 1.0, 10.0, bed__positions=places, **changes))
+        simulation = Simulation(two_spheres(0.0, 1.0, 10.0, bed__positions=places, **changes))
         simulation.until(5.0)
         return float(simulation.particles.temperature[0])
 
@@ -167,7 +83,7 @@ def at_the_floor(wall: dict[str, Any], **heat: Any) -> Case:
     """One sphere on the floor, pressed by its weight, and one that touches nothing."""
     given = {"wall": {"floor": wall}, "gap": "lens", "gas_conductivity": GAS, **heat}
     changes = {"bed__positions": [(0.005, 0.005, 0.00149995), (0.03, 0.01, 0.006)], "laws__gravity": (0.0, 0.0, -9.81)}
-    return case_of(0.0, 0.1, 500.0, given, **changes)
+    return two_spheres(0.0, 0.1, 500.0, given, **changes)
 
 
 def test_a_wall_at_a_temperature_warms_the_particle_that_touches_it_alone() -> None:
@@ -205,7 +121,7 @@ def test_a_rough_contact_resists_and_gas_between_its_asperities_helps() -> None:
     gas = {"gap": "rarefied", "gas_conductivity": 0.027}
 
     def scale(heat: dict[str, Any]) -> float:
-        simulation = Simulation(case_of(-1e-7, 0.1, 10.0, heat))
+        simulation = Simulation(two_spheres(-1e-7, 0.1, 10.0, heat))
         simulation.step()
         return simulation.feature(HeatExchangeOfContacts).scale
 
@@ -215,7 +131,7 @@ def test_a_rough_contact_resists_and_gas_between_its_asperities_helps() -> None:
 
 
 def test_history_snapshot_and_checkpoint_have_the_heat_and_continue_with_the_same_bits() -> None:
-    simulation = Simulation(case_of(-1.33e-7, 0.5, 10.0, {"gap": "lens", "gas_conductivity": GAS}))
+    simulation = Simulation(two_spheres(-1.33e-7, 0.5, 10.0, {"gap": "lens", "gas_conductivity": GAS}))
     simulation.step()
     again = Simulation.restored(simulation.case, simulation.checkpoint())
     for each in (simulation, again):
@@ -229,7 +145,7 @@ def test_history_snapshot_and_checkpoint_have_the_heat_and_continue_with_the_sam
 
 def test_particles_that_move_exchange_heat_while_they_touch() -> None:
     """Two spheres of the gap test that fly towards each other, bounce and part."""
-    case = case_of(1e-5, 1e-4, 1.0, {"held": False}, bed__initial_velocity=(0.0, 0.0, 0.0))
+    case = two_spheres(1e-5, 1e-4, 1.0, {"held": False}, bed__initial_velocity=(0.0, 0.0, 0.0))
     simulation = Simulation(case)
     simulation.particles.velocity[:, 0] = (0.01, -0.01)
     simulation.until(0.02)
@@ -244,7 +160,7 @@ def test_heat_of_the_fluid_and_of_contacts_act_together_on_one_temperature() -> 
     """Two spheres in air of 400 K: contacts even them out, and the air warms both; each budget holds."""
     air = {"fluid_temperature": 400.0, "conductivity": 0.026, "fluid_heat_capacity": 1007.0}
     of_both = {"particle_temperature": COLD, "heat_capacity": HEAT["heat_capacity"]}
-    case = case_of(
+    case = two_spheres(
         -1.33e-7, 0.01, 5.0, {"particle_temperature": None, "heat_capacity": {}},
         fluid={"density": 1.2, "viscosity": 1.8e-5}, heat=air | of_both, laws__drag="none",
         column__cell=(0.015, 0.01, 0.0054),
@@ -280,18 +196,18 @@ def test_heat_of_the_fluid_and_of_contacts_act_together_on_one_temperature() -> 
 )
 def test_wrong_input_is_refused_in_one_line(heat: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message) as failure:
-        case_of(0.0, 0.1, 1.0, heat)
+        two_spheres(0.0, 0.1, 1.0, heat)
     assert len(str(failure.value).splitlines()) == 1
 
 
 def test_fixed_particles_have_no_forces_and_are_refused_with_the_remedy() -> None:
     with pytest.raises(InputError, match=re.escape("contact_heat.held = true")):
-        case_of(0.0, 0.1, 1.0, bed__fixed=True)
+        two_spheres(0.0, 0.1, 1.0, bed__fixed=True)
 
 
 def test_check_warns_of_a_circle_of_softened_contacts() -> None:
     softened = {"material__light": {"density": 420.0, "youngs_modulus": 1e9, "poisson": 0.25, "contact_modulus": 1e7}}
-    case = case_of(0.0, 0.1, 1.0, {"radius": "overlap_circle"}, **softened)
+    case = two_spheres(0.0, 0.1, 1.0, {"radius": "overlap_circle"}, **softened)
     assert "contact_heat.radius" in [each.key for each in preflight(case).issues]
 
 
@@ -310,7 +226,7 @@ def test_ranks_have_the_bits_of_one_process(size: int) -> None:
     spacing, radius = 3.2999e-3, 1.65e-3
     x, y, z = (radius - 1e-7 + spacing * np.arange(n) for n in (13, 4, 2))
     kinds = {"cold": "light", "hot": "heavy"}
-    case = case_of(
+    case = two_spheres(
         0.0, 0.5, 10.0,
         {
             "gap": "lens", "gas_conductivity": GAS, "emissivity": {"light": 0.8, "heavy": 0.8},
@@ -332,14 +248,14 @@ def test_ranks_have_the_bits_of_one_process(size: int) -> None:
 
 
 def test_walls_are_named_in_the_order_of_the_solver() -> None:
-    case = case_of(0.0, 0.1, 1.0)
+    case = two_spheres(0.0, 0.1, 1.0)
     names, solver = wall_names(case), Simulation(case).particle_solver
     assert names == ["floor", "lid", "x_low", "x_high", "y_low", "y_high"] and len(names) == len(solver.walls.sweep)
 
 
 def test_a_mixture_is_placed_one_centre_for_each_particle() -> None:
     with pytest.raises(InputError, match=r"bed\.positions = 1: must be as many as the species count together, 2"):
-        case_of(0.0, 0.1, 1.0, bed__positions=[(0.005, 0.005, 0.005)])
+        two_spheres(0.0, 0.1, 1.0, bed__positions=[(0.005, 0.005, 0.005)])
 
 
 def test_the_case_of_the_page_is_checked_and_written_and_read_back() -> None:

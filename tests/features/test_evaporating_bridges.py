@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from in_process_ranks import on_ranks
-from test_evaporation import HUMID, case_of
 
 from cfddem.backend.communicator import SERIAL
 from cfddem.backend.errors import InputError
@@ -19,6 +18,7 @@ from closures import law
 from closures.bond import neck_area
 from closures.evaporation import latent_heat, saturation_pressure, stefan_drive, vapour_fraction
 from closures.heat_transfer import ranz_marshall
+from scenarios.validation.heat.drops import HUMID, drop
 
 DIAMETER, SPEED = 1e-3, 3.0
 HOT = {"fluid_temperature": 353.15, "conductivity": 0.03, "fluid_heat_capacity": 1010.0}
@@ -36,7 +36,7 @@ def doublet(until: float = 30.0, **changes: Any) -> Case:
         "run__particle_step": 2e-5, "run__fluid_step": 0.02, "run__reference_speed": 0.05,
     }  # fmt: skip
     thermal = {"particle_temperature": 303.15, "heat_capacity": {"glass": 840.0}, **HOT}
-    return case_of(DIAMETER, SPEED, until, thermal, **given | changes)
+    return drop(DIAMETER, SPEED, until, thermal, **given | changes)
 
 
 def rate_per_area(temperature: float, simulation: Simulation) -> float:

@@ -20,21 +20,9 @@ from cfddem.features.heat import HeatExchange
 from cfddem.preflight.summary import preflight
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
+from scenarios.validation.heat.spheres import COOLED, SPHERE, with_changes
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/heat.md"
-CALORIE = 4.1868
-
-SPHERE = {
-    "particle_temperature": 373.15,
-    "fluid_temperature": 298.15,
-    "conductivity": 1.2396e-4 * CALORIE * 100.0,
-    "fluid_heat_capacity": 0.23878 * CALORIE * 1e3,
-    "heat_capacity": {"metal": 0.013145 * CALORIE * 1e3},
-}
-"""Inputs of the test, from calories and centimetres."""
-
-PUBLISHED = {0.5: 346.4858, 1.0: 329.3013, 2.0: 311.0888, 3.0: 303.5241, 5.0: 299.0771}
-"""Temperature of the exact solution by time [s], [K]."""
 
 
 def case_of(**changes: Any) -> Case:
@@ -48,7 +36,7 @@ def case_of(**changes: Any) -> Case:
         "run": {"until": 1.0, "reference_speed": 6.0, "particle_step": 1e-5, "fluid_step": 1e-5},
         "heat": SPHERE,
     }
-    return Case.from_text("", overrides=values | {name.replace("__", "."): value for name, value in changes.items()})
+    return with_changes(values, changes)
 
 
 def started(**changes: Any) -> tuple[Simulation, HeatExchange]:
@@ -64,8 +52,8 @@ def test_a_sphere_cools_by_the_published_exponential_at_any_step(step: float) ->
     simulation.particles.temperature = 373.15
     for number in range(1, round(5.0 / step) + 1):
         heat.before(simulation, step)
-        if (time := round(number * step, 9)) in PUBLISHED:
-            assert abs(simulation.particles.temperature[0] - PUBLISHED[time]) < 1e-3 * 75.0
+        if (time := round(number * step, 9)) in COOLED:
+            assert abs(simulation.particles.temperature[0] - COOLED[time]) < 1e-3 * 75.0
     assert simulation.feature(HeatExchange).imbalance < 1e-12
 
 
@@ -124,7 +112,7 @@ def test_check_warns_of_a_large_biot_number() -> None:
         case = case_of(heat=SPHERE | {"solid_conductivity": {"metal": conductivity}})
         return [each.key for each in preflight(case).issues if "Biot" in each.reason]
 
-    biot = 17.81 * SPHERE["conductivity"] / 6.0  # type: ignore[operator]
+    biot = 17.81 * SPHERE["conductivity"] / 6.0
     assert keys(9.0 * biot) == ["heat.solid_conductivity.metal"] and keys(11.0 * biot) == []
     poor = case_of(heat=SPHERE | {"solid_conductivity": {"metal": 0.1}})
     assert "heat.solid_conductivity.metal" in [each.key for each in preflight(poor).issues]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_heat_in_fluid import HEAT, case_of, lattice
 
 from cfddem.backend.errors import InputError
 from cfddem.features.vapour import Vapour
@@ -14,6 +13,7 @@ from cfddem.model.feature import Equipment
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from closures.heat_transfer import ranz_marshall
+from scenarios.validation.heat.packed import HEAT, lattice, packed
 
 VAPOUR: dict[str, Any] = {"fluid_fraction": 0.0, "inlet_fraction": 0.01, "diffusivity": 2.5e-5}
 
@@ -35,7 +35,7 @@ class Wet(Equipment):
 def test_a_wet_bed_saturates_the_air_by_its_transfer_units_and_loses_what_the_air_gains() -> None:
     """The air leaves with 0.02 - 0.01 exp(-n), n from the law."""
     wet = Wet()
-    case = case_of(vapour=VAPOUR, bed__positions=lattice(4e-3, (2, 2, 10)), laws__kernel_width=0.0)
+    case = packed(vapour=VAPOUR, bed__positions=lattice(4e-3, (2, 2, 10)), laws__kernel_width=0.0)
     simulation = Simulation(case, features=[wet])
     simulation.until(0.5)
     vapour, expected = simulation.feature(Vapour), 0.02 - 0.01 * np.exp(-wet.units)
@@ -47,7 +47,7 @@ def test_a_wet_bed_saturates_the_air_by_its_transfer_units_and_loses_what_the_ai
 
 
 def test_the_sherwood_number_is_the_nusselt_number_with_the_schmidt_number() -> None:
-    case = case_of(
+    case = packed(
         vapour=VAPOUR,
         bed={"diameter": 2e-3, "positions": lattice(4e-3, (2, 2, 2)), "inlet_velocity": 0.5, "fixed": True},
     )
@@ -60,7 +60,7 @@ def test_the_sherwood_number_is_the_nusselt_number_with_the_schmidt_number() -> 
 
 
 def test_a_run_resumes_with_the_same_vapour() -> None:
-    first = Simulation(case_of(vapour=VAPOUR))
+    first = Simulation(packed(vapour=VAPOUR))
     for _ in range(20):
         first.step()
     again = Simulation.restored(first.case, first.checkpoint())
@@ -70,6 +70,14 @@ def test_a_run_resumes_with_the_same_vapour() -> None:
     same = [row(first)[name] == value for name, value in row(again).items() if "vapour" in name]
     assert len(same) == 6 and all(same) and 0.0 < row(first)["mean_vapour"] < 0.01
     assert np.array_equal(first.feature(Vapour).cells.value, again.feature(Vapour).cells.value)
+
+
+def test_air_and_particles_in_equilibrium_have_no_imbalance_of_round_off_over_round_off() -> None:
+    same = HEAT | {"particle_temperature": 300.0}
+    simulation = Simulation(packed(vapour=VAPOUR | {"fluid_fraction": 0.01}, heat=same))
+    for _ in range(10):
+        simulation.step()
+    assert row(simulation)["vapour_imbalance"] < 1e-9 and row(simulation)["heat_imbalance"] < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -83,5 +91,5 @@ def test_a_run_resumes_with_the_same_vapour() -> None:
 )
 def test_wrong_input_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message) as failure:
-        case_of(**{"vapour": VAPOUR} | changes)
+        packed(**{"vapour": VAPOUR} | changes)
     assert len(str(failure.value).splitlines()) == 1

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_heat_in_fluid import HEAT, case_of
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.heat import HeatExchange
 from cfddem.preflight.summary import preflight
 from cfddem.run.simulation import Simulation
+from scenarios.validation.heat.packed import HEAT, packed
 
 EDGE, WARMER, PRANDTL = 0.1, 10.0, 0.71
 
@@ -25,7 +25,7 @@ def cavity(rayleigh: float, cells: int, **changes: Any) -> Case:
     around = {"sides": "no_slip", "front": "free_slip", "ends": "closed"}
     product = 9.81 * WARMER / 300.0 * EDGE**3 / rayleigh  # of kinematic viscosity and thermal diffusivity
     diffusivity = math.sqrt(product / PRANDTL)
-    return case_of(
+    return packed(
         fluid={"density": 1.2, "viscosity": 1.2 * PRANDTL * diffusivity},
         column={
             "width": EDGE, "depth": spacing, "height": EDGE, "cell": spacing, **around,
@@ -89,15 +89,13 @@ def test_warm_fluid_is_lighter_by_its_expansion_and_at_rest_where_it_is_warm_eve
 )
 def test_wrong_input_is_refused_in_one_line(heat: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message) as failure:
-        case_of(heat=HEAT | heat)
+        packed(heat=HEAT | heat)
     assert len(str(failure.value).splitlines()) == 1
 
 
 def test_a_liquid_needs_its_expansion_and_large_differences_are_warned_of() -> None:
     water = {"fluid": {"density": 998.0, "viscosity": 1e-3}, "heat": HEAT | {"buoyancy": "boussinesq"}}
     with pytest.raises(InputError, match=re.escape("heat.expansion: must be given with buoyancy")):
-        case_of(**water)
-    found = [
-        each for each in preflight(case_of(heat=HEAT | {"buoyancy": "boussinesq"})).issues if "10 %" in each.reason
-    ]
+        packed(**water)
+    found = [each for each in preflight(packed(heat=HEAT | {"buoyancy": "boussinesq"})).issues if "10 %" in each.reason]
     assert [each.key for each in found] == ["heat.buoyancy"] and "by 33 %" in found[0].reason
