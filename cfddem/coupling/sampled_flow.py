@@ -253,7 +253,7 @@ class SharpFlowSampler(FlowSampler):
         voidage, reynolds, others, narrowing, of_others, company = np.empty((6, particles.count))
         flow = SampledFlow(slip, unseen, voidage, reynolds, others, ratio, narrowing, of_others, company)
         spheres = _Spheres(cell_map.volume, particles.radius, particles.velocity, particles.viscosity)
-        _sample_sharp(gathered, around, last, spheres, own, self.fluid.density, flow)
+        _sample_sharp(gathered, around, self.seen.change, last, spheres, own, self.fluid.density, flow)
         return flow
 
     def remember(self, particles: Particles, flow: SampledFlow) -> None:
@@ -280,7 +280,22 @@ class _Spheres(NamedTuple):
 
 
 @inline
-def _sample_one(n, gathered, around, last, spheres, own, density, flow):
+def _share_of_surface(change, gathered):
+    """Share of what a particle sees of the suspension that it belongs to: 1 but at a surface that opens into a fan.
+
+    change    of the solid fraction, see `SeenSolids`
+    gathered  of `SharpFlowSampler._means`
+    """
+    along, square = 0.0, 0.0
+    for d in range(3):
+        slip = gathered[d] - gathered[7 + d] / max(gathered[3], 1e-300)
+        along += change[d] * slip
+        square += slip * slip
+    return math.exp(-along * along / square) if along > 0.0 else 1.0
+
+
+@inline
+def _sample_one(n, gathered, around, change, last, spheres, own, density, flow):
     """See `_sample_sharp`."""
     cells = gathered[n, 3]
     share = min(max(own.solid[n] / max(cells, 1e-300), 0.0), 1.0)
@@ -288,7 +303,9 @@ def _sample_one(n, gathered, around, last, spheres, own, density, flow):
     flow.company[n] = of_others / max(cells, 1e-300)
     own_share = min(max(own.seen[n] / max(around[n], 1e-300), 0.0), 1.0)
     solid = max(around[n] - own_share * own.seen[n], 0.0)
-    voidage = 1.0 - (solid if math.isnan(last[n]) else 0.5 * (solid + last[n]))
+    belongs = _share_of_surface(change[n], gathered[n])
+    seen = solid if math.isnan(last[n]) else 0.5 * (solid + last[n])
+    voidage = 1.0 - (belongs * seen + (1.0 - belongs) * of_others)
     narrowing, square = (1.0 - of_others) / voidage, 0.0
     for d in range(3):
         disturbed = 0.0
@@ -307,13 +324,14 @@ def _sample_one(n, gathered, around, last, spheres, own, density, flow):
 
 
 @threaded
-def _sample_sharp(gathered, around, last, spheres, own, density, flow):
+def _sample_sharp(gathered, around, change, last, spheres, own, density, flow):
     """The flow around every particle, without its own part.
 
     gathered  of `SharpFlowSampler._means` (N, 10)
     around    solid fraction that each sees at the end of the step (N,) [-]
+    change    of the solid fraction, see `SeenSolids` (N, 3)
     last      that of the others which it saw in the last step, or NaN (N,) [-]
     own       zeros switch the correction off
     """
     for n in prange(len(around)):
-        _sample_one(n, gathered, around, last, spheres, own, density, flow)
+        _sample_one(n, gathered, around, change, last, spheres, own, density, flow)

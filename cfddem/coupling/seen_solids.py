@@ -47,24 +47,26 @@ class SeenSolids:
     kernel  of the run; without a second stage (width 0) a particle sees what it gathers there
 
     cells   the kernel on its own cells
+    change  of x around each particle in the last call of `around`, over m_0: sigma grad x / (m_0 x) (N, 3) [-]
     """
 
     def __init__(self, kernel: FilterKernel) -> None:
         self.cells, self._weighted = cells_of(kernel), kernel.smoothing > 0.0
         self._map: ParticleCellMap | None = None  # of the particles in the last call of `around`
         self._weights, self._sums = np.zeros((2, 0))
+        self.change = np.zeros((0, 3))
 
     def around(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction around every particle, its own part included (N,) [-]."""
         cells = self.cells
         if not self._weighted:
-            self._map, self._weights = cell_map, cell_map.volume
+            self._map, self._weights, self.change = cell_map, cell_map.volume, np.zeros((len(cell_map.volume), 3))
             self._sums = self._summed(cell_map.volume[:, None])[:, 0]
             return cells.gather(cell_map.stencil, cells.solid_fraction(cell_map)[None])[:, 0]
         self._map = cells.map_particles(cell_map.position, cell_map.radius)
         gathered = cells.solids_with_slope(self._map)
-        weighted = np.empty((len(gathered), 2))
-        _weigh(gathered, cell_map.volume, cells.width(cell_map.radius) / SHARPNESS, weighted)
+        weighted, self.change = np.empty((len(gathered), 2)), np.empty((len(gathered), 3))
+        _weigh(gathered, cell_map.volume, cells.width(cell_map.radius) / SHARPNESS, weighted, self.change)
         sums = self._summed(weighted)
         self._weights, self._sums = weighted[:, 1], sums[:, 1]
         mean: Array = sums[:, 0] / sums[:, 1]
@@ -103,15 +105,16 @@ def parts_of(kernel: FilterKernel) -> tuple[int, int, int]:
 
 
 @threaded
-def _weigh(gathered, volume, length, weighted):
-    """Weight g times x, and g, of every particle.
+def _weigh(gathered, volume, length, weighted, change):
+    """Weight g times x, and g, of every particle, and the change of x.
 
     gathered  x, and its derivatives along x, y, z (N, 4) [-], [1/m]
     length    standard deviation of the particle's kernel over m_0 (N,) [m]
     """
     for n in prange(len(volume)):
-        solid = gathered[n, 0]
-        slope = gathered[n, 1] ** 2 + gathered[n, 2] ** 2 + gathered[n, 3] ** 2
-        uneven = slope * (length[n] / solid) ** 2
+        solid, uneven = gathered[n, 0], 0.0
+        for d in range(3):
+            change[n, d] = gathered[n, 1 + d] * length[n] / solid
+            uneven += change[n, d] ** 2
         weighted[n, 1] = volume[n] * max(math.exp(-uneven), LEAST_WEIGHT)
         weighted[n, 0] = weighted[n, 1] * solid
