@@ -199,28 +199,37 @@ class Case(CaseTables):
     def surface(self) -> Literal["smeared", "sharp"]:
         """What particles at the surface of a bed see.
 
-        `laws.surface = "auto"` is sharp where a law of agitation acts, in model A, and smeared otherwise: without
-        agitation, beds break into plugs more with sharp surfaces.
+        `laws.surface = "auto"` is sharp in a liquid, in model A with a law of drag, and smeared in a gas, in model B, in
+        vessels and beside thin walls, where sharp surfaces have not been tried.
         """
-        laws = self.laws
-        if laws.surface != "auto":
-            return laws.surface
-        return "sharp" if self.agitation != "none" and laws.model == "A" and laws.drag_law is not None else "smeared"
+        return self._surface_and_reason[0]
 
     @property
     def surface_in_words(self) -> str:
         """What particles at the surface of a bed see, and why; empty for one sphere, and where nothing resists it.
 
-        A smeared surface in a gas is not worth a word either: agitation acts in liquids only.
+        A smeared surface in a gas is not worth a word either.
         """
-        if not self.resists or self.is_one_sphere or not (self.in_liquid or self.surface == "sharp"):
+        surface, reason = self._surface_and_reason
+        if not self.resists or self.is_one_sphere or not (self.in_liquid or surface == "sharp"):
             return ""
-        if self.laws.surface != "auto":
-            return self.surface
-        if self.surface == "sharp":
-            return "sharp, the default where agitation acts"
-        acts = self.agitation != "none"
-        return "smeared, the default " + ("in model B" if acts and self.laws.model == "B" else "without agitation")
+        return f"{surface}, the default {reason}" if reason else surface
+
+    @property
+    def _surface_and_reason(self) -> tuple[Literal["smeared", "sharp"], str]:
+        """What particles at the surface of a bed see, and where that is the default; no reason if the case says it."""
+        laws = self.laws
+        if laws.surface != "auto":
+            return laws.surface, ""
+        if not self.in_liquid:
+            return "smeared", "in a gas"
+        if laws.model == "B" or laws.drag_law is None:
+            return "smeared", "in model B" if laws.model == "B" else "without drag"
+        if laws.kernel_width == 0.0 or self.is_one_sphere:
+            return "smeared", "of one sphere" if self.is_one_sphere else "without a kernel"
+        if self.vessel is not None or self.thin_walls:
+            return "smeared", "in a vessel" if self.vessel else "beside thin walls"
+        return "sharp", "in a liquid"
 
     @property
     def agitation_factors(self) -> AgitationFactors:

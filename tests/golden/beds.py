@@ -41,6 +41,7 @@ inlet_velocity = 0.157033
 [laws]
 drag = "wen_yu"
 lubrication = "nijssen"
+surface = "smeared"
 [run]
 until = 1.0
 particle_step = 4.0e-5
