@@ -26,13 +26,15 @@ SPHERE = math.pi / 6.0 * 1e-9
 SIDES = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 
 
-def fixed_bed(layers: int, cell: float) -> tuple[float, Array]:
+def fixed_bed(layers: int, cell: float, below: int = 0) -> tuple[float, Array]:
     """Pressure drop of a fixed cubic lattice over the law's, and force on its layers over the law's, from the top.
 
     The law holds for the lattice up to its last layer: without a kernel all of these are 1.
+
+    below  layers that are left out above the floor
     """
     places = [((i + 0.5) * PITCH, (j + 0.5) * PITCH, (k + 0.5) * PITCH)
-              for k in range(layers) for j in range(9) for i in range(9)]  # fmt: skip
+              for k in range(below, below + layers) for j in range(9) for i in range(9)]  # fmt: skip
     bed = {"start": "placed", "positions": places, "count": None, "fixed": True}
     laws = {"laws.agitation": "none", "laws.surface": "sharp"}
     case = glass(0.03).with_(**{f"bed.{key}": value for key, value in bed.items()}, **{"column.cell": cell}, **laws)
@@ -43,7 +45,7 @@ def fixed_bed(layers: int, cell: float) -> tuple[float, Array]:
     particles = simulation.particles
     force = particles.applied[:, 2] + (2500.0 - 998.0) * 9.81 * SPHERE
     layer = np.floor(particles.position[:, 2] / PITCH).astype(int)
-    means = np.array([force[layer == k].mean() for k in reversed(range(layers))])
+    means = np.array([force[layer == k].mean() for k in reversed(range(below, below + layers))])
     return history.row(simulation)["pressure_drop"] / law, means * layers * LAYER / (law * 1e-4)
 
 
@@ -66,6 +68,13 @@ def test_a_deeper_fixed_bed_has_the_drag_of_the_law(cell: float, limit: float) -
     drop, layers = fixed_bed(15, 1e-3 * cell)
     assert drop == pytest.approx(1.0, abs=limit)
     assert layers == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_plug_has_one_sharp_surface_that_downstream() -> None:
+    """The last layer carries its load; the first one sees the mean over space, so that the plug opens into a fan."""
+    layers = fixed_bed(6, 5e-3 / 3.0, below=8)[1]
+    assert layers[:4].min() > 0.8
+    assert 0.3 < layers[-1] < 0.6
 
 
 @pytest.mark.slow
