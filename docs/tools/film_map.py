@@ -186,8 +186,6 @@ def sections(beds: Beds) -> Iterator[str]:
     """The parts of the results."""
     pairs, asked = effects.compared(beds), list(plan())
     seeds = sorted({found.seeds for pair in pairs if (found := of_pair(beds, pair, "bed_height")) is not None})
-    picture = "Changes of a liquid bed by films, against the Stokes number of its collisions"
-    yield f"![{picture}](../../../docs/images/film_map.png)"
     yield wrapped(
         f"{len(beds)} of {len(asked)} beds have run; {len(pairs)} beds with films are compared with the bed without, "
         f"from {' to '.join(f'{each}' for each in sorted({min(seeds), max(seeds)}))} seeds. "

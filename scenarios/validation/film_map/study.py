@@ -156,6 +156,8 @@ def draw(beds: Beds, path: Path) -> None:
         each.set_xscale("log")
         if what == "dissipation":
             each.set_yscale("log")
+            each.yaxis.set_major_formatter("{x:g}")
+            each.yaxis.set_minor_formatter("{x:g}")
         label(each, "median St of the collisions", "-", name, unit, title)
     _explain(axes[-1], beds)
     save(figure, path)
