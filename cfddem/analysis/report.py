@@ -105,7 +105,7 @@ def window_of(run: RunData, case: Case) -> tuple[float, float]:
 def _start_of_means(case: Case, first: float, end: float) -> float:
     """Middle of a run, or of the time for which its inlet holds its last velocity [s]."""
     times, velocities = pairs_of(case.bed.inlet_velocity).T
-    last = np.interp(end, times, velocities)
+    last = at_times(case.bed.inlet_velocity, end)
     changing = [time for time, each in zip(times, velocities) if time < end and each != last]
     begins = [time for time in times if time < end and time > max(changing, default=-math.inf)]
     return 0.5 * (max(begins[0], first) + end) if begins else 0.5 * (first + end)

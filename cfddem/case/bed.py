@@ -37,8 +37,8 @@ def pairs_of(velocity: InTime) -> NDArray[np.float64]:
 def at_times(velocity: InTime, times: NDArray[np.float64] | float) -> Any:
     """A velocity in time at some times [s], between its pairs by straight lines [m/s].
 
-    >>> at_times(((0.0, 0.1), (2.0, 0.3)), 1.0), at_times(0.2, 1.0)
-    (0.2, 0.2)
+    >>> at_times(((0.0, 0.1), (2.0, 0.3)), [0.0, 1.0, 9.0]).tolist()
+    [0.1, 0.2, 0.3]
     """
     return np.interp(times, *pairs_of(velocity).T)
 

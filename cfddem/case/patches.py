@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, shown
-from cfddem.case.bed import NonNegative, Positive, check_times, speeds_of
+from cfddem.case.bed import NonNegative, Positive, at_times, check_times, speeds_of
 from cfddem.case.materials import Checked
 
 PLACES = 120
@@ -141,9 +141,7 @@ class CasePatch(Checked):
 
     def speed(self, time: float) -> float:
         """Superficial velocity of an inlet at a time, its mean over the patch [m/s]."""
-        if isinstance(self.velocity, tuple):
-            return float(np.interp(time, *np.array(self.velocity).T))
-        return self.velocity or 0.0
+        return float(at_times(self.velocity or 0.0, time))
 
     def weight(self, x: Array, y: Array, middle: Place) -> Array:
         """Velocity at places on the side over its mean, 0 outside of the patch [-].

@@ -199,8 +199,8 @@ class Case(CaseTables):
     def surface(self) -> Literal["smeared", "sharp"]:
         """What particles at the surface of a bed see.
 
-        `laws.surface = "auto"` is sharp in a liquid, in model A with a law of drag, and smeared in a gas, in model B, in
-        vessels and beside thin walls, where sharp surfaces have not been tried.
+        `laws.surface = "auto"` is sharp in a liquid, in model A with a law of drag, and smeared in a gas, in model B,
+        in vessels and beside thin walls, where sharp surfaces have not been tried.
         """
         return self._surface_and_reason[0]
 

@@ -118,7 +118,7 @@ class CaseTables(Checked):
     material: Materials = Field(min_length=1, description="solids by name")
     pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
     column: Column
-    vessel: CaseVessel | None = Field(None, description="a round vessel with a smooth wall, in the column")
+    vessel: CaseVessel | None = Field(None, description="a vessel with a smooth wall, in the column")
     patch: dict[Name, CasePatch] = Field({}, description="inlets, outlets and walls on floor, lid and sides, by name")
     bed: Bed
     wall: tuple[CaseWall, ...] = Field((), description="walls beside those of the column")

@@ -246,14 +246,14 @@ class SharpFlowSampler(FlowSampler):
     ) -> SampledFlow:
         """See `FlowSampler.sample`."""
         assert self.seen is not None
-        around = self.seen.around(cell_map)
+        solids = _Solids(self.seen.around(cell_map), self.seen.change, particles[SEEN.name])
         gathered = self._means(particles, cell_map, solid if mean is None else mean)
-        own, last = self.own(particles, cell_map), particles[SEEN.name]
+        own = self.own(particles, cell_map)
         (slip, unseen), ratio = np.empty((2, particles.count, 3)), self._diameter_ratio(particles, cell_map, solid)
         voidage, reynolds, others, narrowing, of_others, company = np.empty((6, particles.count))
         flow = SampledFlow(slip, unseen, voidage, reynolds, others, ratio, narrowing, of_others, company)
         spheres = _Spheres(cell_map.volume, particles.radius, particles.velocity, particles.viscosity)
-        _sample_sharp(gathered, around, self.seen.change, last, spheres, own, self.fluid.density, flow)
+        _sample_sharp(gathered, solids, spheres, own, self.fluid.density, flow)
         return flow
 
     def remember(self, particles: Particles, flow: SampledFlow) -> None:
@@ -279,6 +279,14 @@ class _Spheres(NamedTuple):
     viscosity: Array
 
 
+class _Solids(NamedTuple):
+    """The solids that every particle sees, see `SeenSolids`."""
+
+    around: Array  # solid fraction at the end of the step (N,) [-]
+    change: Array  # of the solid fraction (N, 3)
+    last: Array  # solid fraction of the others in the last step, or NaN (N,) [-]
+
+
 @inline
 def _share_of_surface(change, gathered):
     """Share of what a particle sees of the suspension that it belongs to: 1 but at a surface that opens into a fan.
@@ -295,16 +303,17 @@ def _share_of_surface(change, gathered):
 
 
 @inline
-def _sample_one(n, gathered, around, change, last, spheres, own, density, flow):
+def _sample_one(n, gathered, solids, spheres, own, density, flow):
     """See `_sample_sharp`."""
+    around, last = solids.around[n], solids.last[n]
     cells = gathered[n, 3]
     share = min(max(own.solid[n] / max(cells, 1e-300), 0.0), 1.0)
     of_others = max(cells - share * own.solid[n], 0.0)
     flow.company[n] = of_others / max(cells, 1e-300)
-    own_share = min(max(own.seen[n] / max(around[n], 1e-300), 0.0), 1.0)
-    solid = max(around[n] - own_share * own.seen[n], 0.0)
-    belongs = _share_of_surface(change[n], gathered[n])
-    seen = solid if math.isnan(last[n]) else 0.5 * (solid + last[n])
+    own_share = min(max(own.seen[n] / max(around, 1e-300), 0.0), 1.0)
+    solid = max(around - own_share * own.seen[n], 0.0)
+    belongs = _share_of_surface(solids.change[n], gathered[n])
+    seen = solid if math.isnan(last) else 0.5 * (solid + last)
     voidage = 1.0 - (belongs * seen + (1.0 - belongs) * of_others)
     narrowing, square = (1.0 - of_others) / voidage, 0.0
     for d in range(3):
@@ -317,21 +326,18 @@ def _sample_one(n, gathered, around, change, last, spheres, own, density, flow):
         slip = between - narrowing * share * disturbed - velocity
         flow.slip[n, d], flow.unseen[n, d] = slip, fluid - velocity - slip / narrowing
         square += slip * slip
-    flow.others[n] = max(around[n] - own.seen[n], 0.0) / spheres.volume[n]
+    flow.others[n] = max(around - own.seen[n], 0.0) / spheres.volume[n]
     flow.solid[n], flow.voidage[n], flow.narrowing[n] = solid, voidage, narrowing
     scale = density * 2.0 * spheres.radius[n] / max(spheres.viscosity[n], 1e-300)
     flow.reynolds[n] = scale * voidage * math.sqrt(square)
 
 
 @threaded
-def _sample_sharp(gathered, around, change, last, spheres, own, density, flow):
+def _sample_sharp(gathered, solids, spheres, own, density, flow):
     """The flow around every particle, without its own part.
 
     gathered  of `SharpFlowSampler._means` (N, 10)
-    around    solid fraction that each sees at the end of the step (N,) [-]
-    change    of the solid fraction, see `SeenSolids` (N, 3)
-    last      that of the others which it saw in the last step, or NaN (N,) [-]
     own       zeros switch the correction off
     """
-    for n in prange(len(around)):
-        _sample_one(n, gathered, around, change, last, spheres, own, density, flow)
+    for n in prange(len(gathered)):
+        _sample_one(n, gathered, solids, spheres, own, density, flow)

@@ -113,10 +113,13 @@ CHANGEABLE = (
         "youngs_modulus", "contact_modulus", "poisson", "restitution", "friction", "rolling_friction",
         "friction_lubricated", "roughness",
     )),
-    "laws.drag", "laws.agitation", "laws.surface", "laws.gravity", "laws.lift", "laws.torque", "laws.viscous_stress",
+    "laws.drag", "laws.gravity", "laws.lift", "laws.torque", "laws.viscous_stress",
     "laws.convection", "laws.contact_parameters.*",
 )  # fmt: skip
 """Keys whose values the state of a run does not hold, or holds in a field that is made anew."""
+
+NAMED = ("laws.agitation", "laws.surface")
+"""Keys that the state depends on, whose `"auto"` may be replaced by the name of the law that it has chosen."""
 
 _CHANGEABLE = re.compile(
     "|".join(re.escape(key).replace("NAME", r"[^.]+").replace(r"\.\*", r"(\..*)?") for key in CHANGEABLE)
@@ -131,16 +134,15 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
     state = checkpoint.newest(origin)
     before = case_to_continue(origin, None, None)
     for key in changed([before, case]):
-        if not _CHANGEABLE.fullmatch(key):
+        if key not in NAMED and not _CHANGEABLE.fullmatch(key):
             others = ", ".join(each for each in CHANGEABLE if each.startswith(f"{key.split('.')[0]}."))
             remedy = f"of this table, {others} can change" if others else "run the changed case from its beginning"
             raise InputError(key, None, f"left as it is in {origin}, whose state depends on it", remedy)
-    for key in ("agitation", "surface"):
-        chosen = [getattr(each, key) for each in (before, case)]
+    for key in NAMED:
+        chosen = [getattr(each, key.removeprefix("laws.")) for each in (before, case)]
         was, now = (each if isinstance(each, str) else each.name for each in chosen)
         if was != now:
-            limit, key = f"{was!r}, as in {origin}", f"laws.{key}"
-            raise InputError(key, now, limit, f"name it where it is auto: --set {key}={was}")
+            raise InputError(key, now, f"{was!r}, as in {origin}", f"name it where it is auto: --set {key}={was}")
     try:
         time = float(state["time"])
         if case.run.until > time:

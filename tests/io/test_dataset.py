@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -174,3 +175,16 @@ def test_without_xarray_one_line_says_how_to_install_it(folder, monkeypatch):
     with pytest.raises(InputError) as failure:
         open_run(folder).dataset()
     assert str(failure.value) == "dataset: must be used with xarray installed; `pip install 'cfddem[data]'`"
+
+
+def test_without_xarray_runs_are_made_read_and_reported(folder):
+    """In a new process, because the blocked package may have been imported here."""
+    program = f"""
+import sys
+sys.modules["xarray"] = None
+import cfddem.run.runner, cfddem.analysis.report
+from cfddem import open_run
+print(open_run({str(folder)!r}).fluid("voidage").shape)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "(20, 4, 10)\n"), done.stderr

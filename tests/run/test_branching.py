@@ -81,6 +81,19 @@ def test_what_a_run_cannot_change_is_refused(bed: Path, tmp_path: Path, change: 
     assert not folder.exists()
 
 
+def test_a_refusal_names_no_law_that_cannot_change(bed: Path, tmp_path: Path) -> None:
+    """A name in the place of auto is no change, and an offer to change it would be refused next."""
+    words = ("run", "--from", str(bed), "--set", "until=0.011", "-o", str(tmp_path / "other"), "--set")
+    refused = call(*words, "laws.rolling_damping=0.5")
+    assert refused.code == 2 and "laws.drag" in refused.err
+    for key in ("laws.agitation", "laws.surface"):
+        assert key not in refused.err
+    changed = call(*words, "laws.surface=smeared")
+    assert changed.code == 2 and "--set laws.surface=sharp" in changed.err
+    named = call(*words, "laws.surface=sharp", "--set", "laws.agitation=free_spheres")
+    assert named.code == 0, named.err
+
+
 def test_a_case_beside_from_and_a_folder_without_a_run_are_refused(bed: Path, tmp_path: Path) -> None:
     assert "left out: the case is that of" in call("run", "liquid-bed", "--from", str(bed)).err
     assert call("run", "--from", str(tmp_path), "--set", "until=1").code == 2

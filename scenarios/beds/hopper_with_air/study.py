@@ -2,7 +2,7 @@
 
 >>> from cfddem.case.gallery import gallery
 >>> round(beverloo(gallery()["hopper-with-air"]), 3)
-0.173
+0.174
 """
 
 from __future__ import annotations
