@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,29 @@ def refuse_openings(case: Any) -> None:
                 f"it reaches from {first} = {left:.4g} to {right:.4g} m, {second} = {low:.4g} to {top:.4g} m; move it, "
                 "or make it smaller",
             )  # fmt: skip
+    openings = [(name, each) for name, each in case.patch.items() if each in case.openings]
+    for (first_name, one), (name, other) in combinations(openings, 2):
+        common = overlap(one, other, middle_of(case, one.side)) if one.side == other.side else 0.0
+        if common > ROUND_OFF * max(lengths_of(case, one.side)):
+            raise InputError(
+                f"patch.{name}.centre", shown(other.centre), f"such that it lies beside patch.{first_name}",
+                f"they overlap by {common:.3g} m on {one.side}; move one of them, or make it smaller",
+            )  # fmt: skip
+
+
+def overlap(one: CasePatch, other: CasePatch, middle: tuple[float, float]) -> float:
+    """How far two discs or boxes of one side reach into each other; negative where they are apart [m].
+
+    middle  of the side [m]
+
+    >>> disc = CasePatch(kind="outlet", shape="disc", diameter=0.03, centre=(0.04, 0.031))
+    >>> round(overlap(disc, disc.model_copy(update={"centre": (0.04, 0.045)}), (0.0, 0.0)), 6)
+    0.016
+    """
+    half = 0.5 * (np.array(one.size or (0.0, 0.0)) + np.array(other.size or (0.0, 0.0)))
+    beyond = np.abs(np.subtract(one.centre or middle, other.centre or middle)) - half
+    apart = math.hypot(*np.maximum(beyond, 0.0)) + min(float(max(beyond)), 0.0)
+    return 0.5 * ((one.diameter or 0.0) + (other.diameter or 0.0)) - apart
 
 
 def _refuse_side(case: Any, key: str, patch: CasePatch) -> None:

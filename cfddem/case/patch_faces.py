@@ -63,12 +63,14 @@ def patch_faces(case: CaseTables, side: str) -> PatchFaces:
             remedy = "move it, or make it larger than a cell"
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
     entering = [_covered(case, patches[name], made.shares[name]) for name in made.inlets]
+    closed = [made.whole(name) for name, each in patches.items() if not each.brings]
     for name, each in patches.items():
         opens = bool(case.vessel) and side not in ENDS
+        if opens and each.brings and closed:  # openings lie apart, and two may still meet in a face
+            made.shares[name][np.any(closed, axis=0)] = 0.0
         if each.brings and (each.mass_flow is not None or opens):  # exactly, also where faces do not follow the edge
             area, face = open_area_of(case, each), grid_of(case).face_area(PLANES[side][0])
             made.shares[name][:] *= area / (float((made.shares[name] * _apertures(case, side)).sum()) * face)
-    closed = [made.whole(name) for name, each in patches.items() if not each.brings]
     beside = np.maximum(1.0 - sum(entering), 0.0)
     return made._replace(rest=np.where(np.any(closed, axis=0), 0.0, beside) if closed else beside)
 

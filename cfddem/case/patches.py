@@ -240,13 +240,17 @@ def open_area_of(case: Any, patch: CasePatch) -> float:
     return patch.area * float((weight * inside).sum() / max(weight.sum(), 1e-300))
 
 
-def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float]) -> None:
-    """Raise InputError for a name that is no inlet patch of a case.
+def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float], instead: str) -> None:
+    """Raise InputError for a name that is no inlet patch of a given flow.
 
-    key  of the table with these names
+    key      of the table with these names
+    instead  the key of what enters by a pressure
     """
     inlets = [name for name, each in case.patch.items() if each.brings]
-    for name in names:
+    for name, value in names.items():
+        if name in case.patch and case.patch[name].pressure is not None:
+            limit = "left out for a patch that is driven by a pressure"
+            raise InputError(f"{key}.{name}", value, limit, f"take {instead}")
         if name not in inlets:
             limit = "one of the inlets " + ", ".join(inlets) if inlets else "left out without inlets by [patch.NAME]"
             raise InputError(f"{key}.{name}", None, limit)

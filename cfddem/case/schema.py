@@ -277,8 +277,8 @@ class Case(CaseTables):
     def reference_speed(self) -> float:
         """Highest collision speed to expect [m/s].
 
-        As given in `run.reference_speed`, or the largest of twice the inlet velocity, the speed after a fall of one
-        diameter, the initial speed, and the speeds of walls and feeds.
+        As given in `run.reference_speed`, or the largest of twice the inlet velocity, the speed of free flow by the
+        pressures of patches, that after a fall of one diameter, the initial speed, and those of walls and feeds.
         """
         if self.run.reference_speed is not None:
             return self.run.reference_speed
@@ -286,7 +286,7 @@ class Case(CaseTables):
         speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*each.velocity) for each in self.feed)]
         speeds += [each.fastest for each in self.wall if math.isfinite(each.fastest)]
         speeds += [abs(self.vessel.spin) * max(radius for _, radius in self.line)] if self.vessel else []
-        return max(2.0 * self.fastest_inflow, fall, *speeds)
+        return max(2.0 * self.fastest_inflow, self.fastest_by_pressure, fall, *speeds)
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:

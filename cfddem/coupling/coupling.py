@@ -59,6 +59,9 @@ class Coupling:
                and the flow that its boundaries drive between them
     kernel     deposits on cells and gathers from them
     forces     in the order in which they act
+
+    `exchanged_impulse` has the impulses of drag in this step of the particles before every exchange, and less those
+    after it; their sum is what the particles that have left received (N, 3) [N s].
     """
 
     def __init__(
@@ -80,6 +83,7 @@ class Coupling:
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
         self._mean_step = 0.0
+        self.exchanged_impulse = np.zeros((0, 3))
         own = (MAPPED, RESPONSE, CROWDING, *self.flow.fields)
         for field in own:
             particles.declare(field)
@@ -110,6 +114,7 @@ class Coupling:
         particles  of this rank, without ghosts
         part       measures the wall time of a part
         """
+        self.exchanged_impulse = np.zeros((0, 3))
         with part("voidage and drag"):
             terms = self.prepare(particles, step)
         with part("fluid"):
@@ -121,6 +126,8 @@ class Coupling:
     def exchange(self, before: Particles, after: Particles) -> None:
         """Let particles that enter replace fluid of their own volume, and those that leave make room for it."""
         self.fluid.add_voidage(self.solid_fraction(before) - self.solid_fraction(after))
+        parts = (self.exchanged_impulse, before.drag_impulse, -after.drag_impulse)
+        self.exchanged_impulse = np.concatenate(parts)
 
     def prepare(self, particles: Particles, step: float) -> CouplingTerms:
         """What the particles send into the coming fluid step [s]: volume, drag, momentum and explicit forces.

@@ -75,7 +75,8 @@ class Feeds(CaseFeature):
             f"outlet.{number}": ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True)
             for number, each in enumerate(case.outlet)
         }
-        self.outlets |= {f"patch.{name}": Opening(case, each) for name, each in case.drains.items()}
+        self._openings = {f"patch.{name}": Opening(case, each) for name, each in case.drains.items()}
+        self.outlets |= self._openings
         self._summary: tuple[int, tuple[float, ...]] = (-1, ())  # number that left, and what their times gave
 
     @classmethod
@@ -88,6 +89,11 @@ class Feeds(CaseFeature):
         """What the particles of a case with feeds or outlets remember."""
         entered = ENTERED if case.feed else replace(ENTERED, initial=0.0)
         return ((LANDED,) if case.feed else ()) + ((entered,) if _drained(case) else ())
+
+    def before(self, simulation: Any, step: float) -> None:
+        """Note the step, over which particles must not bounce off an opening [s]."""
+        for each in self._openings.values():
+            each.step = step
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
@@ -158,11 +164,14 @@ class Feeds(CaseFeature):
 
 
 class Opening(ParticleOutlet):
-    """Removes and counts the particles that touch the wall within a patch.
+    """Removes and counts the particles that touch the wall within a patch, or would within another step.
 
     case   with the vessel or column
     patch  through which they leave
+    step   until the next call, about [s]
     """
+
+    step = 0.0
 
     def __init__(self, case: Case, patch: CasePatch) -> None:
         super().__init__()
@@ -174,13 +183,17 @@ class Opening(ParticleOutlet):
             self._to_wall = float(case.vessel.plan_in(case.column)[:, self._axis].max()) - self._middle
 
     def takes(self, particles: Particles) -> np.ndarray:
-        """Which particles touch the wall, and lie within the outline of the patch as a whole (N,) bool."""
+        """Which particles touch the wall, now or at their velocity within a step, and lie within the outline of the
+        patch as a whole (N,) bool."""
         at, radius, (first, second) = particles.position, particles.radius, along(self._patch.side)
         inside = self._patch.holds(at[:, first], at[:, second], middle_of(self._case, self._patch.side), radius)
         outward, reach = self._outward * (at[:, self._axis] - self._middle), (1.0 + TOUCHING) * radius
+        ahead = at + self.step * particles.velocity
         if self._flat:
-            return np.asarray(inside & (outward + reach >= self._to_wall))
-        return np.asarray(inside & (outward > 0.0) & (self._case.beyond_the_side(at, reach) >= 0.0))
+            soon = self._outward * (ahead[:, self._axis] - self._middle) + radius
+            return np.asarray(inside & (np.maximum(outward + reach, soon) >= self._to_wall))
+        beyond = np.maximum(self._case.beyond_the_side(at, reach), self._case.beyond_the_side(ahead, radius))
+        return np.asarray(inside & (outward > 0.0) & (beyond >= 0.0))
 
 
 def _drained(case: Case) -> bool:

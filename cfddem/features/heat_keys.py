@@ -168,7 +168,7 @@ class Heat(FeatureTable):
         if self.fluid_total_capacity:
             remedy = "leave it out; the fluid in the cells has its density"
             raise InputError("heat.fluid_total_capacity", self.fluid_total_capacity, "left out with cells", remedy)
-        refuse_no_inlets(case, "heat.patch_temperature", self.patch_temperature)
+        refuse_no_inlets(case, "heat.patch_temperature", self.patch_temperature, "heat.outlet_temperature")
         walls = self.names_of_walls(case)
         for key in ("wall_temperature", "wall_coefficient", "wall_flux"):
             for name in getattr(self, key):

@@ -50,4 +50,4 @@ class VapourTable(FeatureTable):
         if not heat.in_cells(case):
             remedy = 'set heat.fluid = "cells", with a law of drag'
             raise InputError("vapour", None, "left out where the fluid has one temperature", remedy)
-        refuse_no_inlets(case, "vapour.patch_fraction", self.patch_fraction)
+        refuse_no_inlets(case, "vapour.patch_fraction", self.patch_fraction, "vapour.outlet_fraction")

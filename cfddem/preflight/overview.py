@@ -244,6 +244,8 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
             note = "at least; the bed bubbles"
         elif bed.inlet > bed.onset:
             note = "by the balance of weight and drag"
+        elif case.outlet or case.drains:
+            note = "at the start, before particles leave"
         yield Row(group, "bed height", bed.height, "m", note)
         yield Row(group, "bed voidage", bed.voidage)
         if bed.inlet:
@@ -256,6 +258,8 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
                 yield Row(group, "pressure drop, Ergun", ergun_gradient(*flow) * bed.height, "Pa")
     elif case.bed.start == "poured" and (not case.wall or vessel_of(case) is not None):
         yield Row(group, "bed height", bed.height, "m", "poured")
+    if case.fastest_by_pressure > 0.0:
+        yield Row(group, "free flow by the pressures", case.fastest_by_pressure, "m/s", "at most, without particles")
 
 
 def _cost(cost: CostEstimate) -> Iterator[Row]:

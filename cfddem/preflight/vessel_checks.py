@@ -61,7 +61,14 @@ def check_patches(case: Case) -> Iterator[Issue]:
             "the patches of the lid leave no part of it open: what enters has to leave",
             'make them smaller, or give a patch of kind = "outlet"',
         )  # fmt: skip
+    if case.run.reference_speed is None and 0.0 < case.fastest_by_pressure == case.reference_speed:
+        yield Issue(
+            "note", "run.reference_speed",
+            f"it is {case.reference_speed:.3g} m/s, that of free flow by the pressures of patches, and sets the steps",
+            "give the speed of the fastest collisions, in m/s, if they are slower, as where a bed slows the flow",
+        )  # fmt: skip
     for name, patch in case.patch.items():
+        yield from _check_drain(case, name, patch)
         if patch.side not in ENDS:
             yield from _check_opening(case, name, patch)
             continue
@@ -80,6 +87,23 @@ def check_patches(case: Case) -> Iterator[Issue]:
                 f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and {outside}",
                 "make it smaller, or move its centre",
             )  # fmt: skip
+
+
+def _check_drain(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
+    """Check that particles fit through a patch by which they leave."""
+    narrow = min(patch.size or (math.inf,))
+    if patch.diameter:
+        narrow = 0.5 * (patch.diameter - patch.inner_diameter) if patch.inner_diameter else patch.diameter
+    smallest = min(each.smallest_diameter for each in case.species.values())
+    largest = case.bed.largest_diameter
+    if patch.particles == "leave" and narrow <= largest:
+        none = narrow <= smallest
+        reached = f"{'no' if none else 'not every'} particle fits through; "
+        reached += f"the smallest is {smallest:.3g} m" if none else f"the largest is {largest:.3g} m"
+        yield Issue(
+            "error" if none else "warning", f"patch.{name}.particles", f"it is {narrow:.3g} m across, and {reached}",
+            'make it wider, or set particles = "stay"',
+        )  # fmt: skip
 
 
 def _check_opening(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:

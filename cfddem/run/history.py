@@ -327,7 +327,8 @@ def momentum_imbalance(simulation: Simulation) -> float:
     """Momentum that the fluid gave and particles did not receive, over that given."""
     fluid, particles, total = simulation.fluid, simulation.owned, simulation.communicator.sum
     # walls, inlets and outlets belong to neither of the two sums
-    given, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
+    received = np.concatenate([particles.drag_impulse, simulation.coupling.exchanged_impulse])
+    given, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(received, axis=0)
     return max(abs(part) for part in given + got) / max(total(np.abs(particles.drag_impulse)), 1e-300)
 
 

@@ -12,7 +12,9 @@ from example_case import GLASS
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
-from cfddem.case.openings import outline
+from cfddem.case.openings import outline, overlap
+from cfddem.case.patch_faces import patch_faces
+from cfddem.case.patches import CasePatch
 from cfddem.case.schema import Case
 from cfddem.features.feeds import Opening
 from cfddem.fluid.solver import FluidSolver
@@ -151,6 +153,7 @@ def test_an_opening_above_atmospheric_pressure_draws_fluid_in_and_one_below_it_l
         ({"patch.air.centre": [0.9, 0.9]}, r"patch.air.centre = \(0.9, 0.9\): must be such that.*move it"),
         ({"vessel.shape": "cone", "vessel.radius": 0.005, "vessel.length": 0.12}, "patch.air.centre.*in the wall"),
         ({"patch.out": {"kind": "outlet", "side": "y_high"}}, "patch.out.shape.*box or disc"),
+        ({"patch.out.side": "x_low", "patch.out.centre": [0.043, 0.045]}, "patch.out.centre.*beside patch.air.*0.01"),
         ({"patch.out.kind": "wall"}, "patch.out.kind.*inlet or outlet|together with an outlet"),
         ({"patch.air.side": "x_hihg"}, "patch.air.side.*one of floor, lid, x_low"),
         ({"patch.out.kind": "inlet", "patch.out.velocity": 1.0}, "patch.*together with an outlet"),
@@ -174,6 +177,77 @@ def test_an_opening_smaller_than_a_cell_is_no_opening_and_the_check_says_so() ->
     said = [each.reason for each in preflight(small).issues if each.key == "patch.air"]
     assert any("1.2 cells across" in each for each in said), said
     assert not [each for each in preflight(made()).issues if each.key.startswith("patch")]
+
+
+def test_openings_that_meet_in_a_face_bring_the_given_flow_and_those_apart_are_not_refused() -> None:
+    """Boxes with half a cell between them along z, in the same faces."""
+    box = {"shape": "box", "side": "x_low", "size": [0.03, 0.02]}
+    low, high = ({**box, "centre": [0.04, z]} for z in (0.024, 0.0451))
+    inlet, outlet = {"kind": "inlet", "velocity": 2.0} | low, {"kind": "outlet"} | high
+    for given in ({"air": inlet, "out": outlet}, {"out": outlet, "air": inlet}):
+        case = made(patch=given)
+        x, entering = flow_in(case)[1][0][:, :, 0], patch_faces(case, "x_low").shares["air"] > 0.0
+        assert x[entering].sum() == pytest.approx(2.0 * 0.03 * 0.02, rel=1e-9)
+        assert x[~entering].sum() == pytest.approx(-2.0 * 0.03 * 0.02, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "common"),
+    [
+        ({"diameter": 0.03}, {"diameter": 0.01, "centre": (0.06, 0.08)}, 0.02 - 0.05),
+        ({"diameter": 0.03}, {"size": (0.04, 0.02), "centre": (0.043, 0.0)}, 0.015 - 0.023),
+        ({"diameter": 0.03}, {"size": (0.04, 0.02), "centre": (0.03, 0.0)}, 0.015 - 0.01),
+        ({"size": (0.02, 0.02)}, {"size": (0.04, 0.02), "centre": (0.03, 0.0)}, 0.0),
+        ({"size": (0.02, 0.02)}, {"size": (0.04, 0.02), "centre": (0.01, 0.017)}, 0.003),
+    ],
+    ids=["discs", "a disc beside a box", "a disc and a box", "boxes that touch", "boxes"],
+)
+def test_discs_and_boxes_overlap_by_their_distance(one: Any, other: Any, common: float) -> None:
+    """A disc of 3 cm or a box at (0.03, 0.04) m less than its neighbour, by hand."""
+    first, second = (
+        CasePatch(kind="outlet", shape="disc" if "diameter" in each else "box", **{"centre": (0.0, 0.0)} | each)
+        for each in (one, other)
+    )
+    if "centre" in other and "diameter" in other:
+        first = first.model_copy(update={"centre": (0.03, 0.04)})
+    assert overlap(first, second, (0.0, 0.0)) == pytest.approx(common, abs=1e-15)
+    assert overlap(second, first, (0.0, 0.0)) == pytest.approx(common, abs=1e-15)
+
+
+def test_a_pressure_gives_the_speed_of_free_flow_where_no_other_is_given() -> None:
+    """sqrt(2 x 5000 Pa / 1.2 kg/m3) = 91.3 m/s; beside 4990 Pa outside, that of 10 Pa."""
+    driven = {"patch.air.velocity": None, "patch.air.pressure": 5000.0, "run.reference_speed": None}
+    case = Case.from_text(TEXT, "c.toml", driven)
+    assert case.reference_speed == pytest.approx(91.287, rel=1e-4) and case.fastest_inflow == 0.0
+    said = [str(each) for each in preflight(case).issues if each.key == "run.reference_speed"]
+    assert len(said) == 1 and "91.3 m/s" in said[0] and "m/s, if they are slower" in said[0]
+    beside = case.with_(**{"patch.out.pressure": 4990.0})
+    assert beside.reference_speed == pytest.approx(math.sqrt(2.0 * 10.0 / 1.2))
+    given = case.with_(**{"run.reference_speed": 3.0})
+    assert given.reference_speed == 3.0
+    assert not [each for each in preflight(given).issues if each.key == "run.reference_speed"]
+    assert {row.name: row.value for row in preflight(given).rows}["free flow by the pressures"] > 91.0
+    assert made(run__reference_speed=None).reference_speed == pytest.approx(2.0 * 2.0), "of a velocity, as ever"
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        {"shape": "disc", "diameter": 3.9e-3, "side": "y_high", "centre": [0.04, 0.06]},
+        {"shape": "ring", "diameter": 0.02, "inner_diameter": 0.0125, "side": "lid"},
+        {"shape": "box", "size": [0.02, 3.9e-3], "side": "floor"},
+    ],
+    ids=lambda each: each["side"],
+)
+def test_a_particle_that_fits_through_no_opening_never_leaves_and_the_check_says_so(patch: dict[str, Any]) -> None:
+    case = made(patch__out={"kind": "outlet", "particles": "leave"} | patch)
+    (found,) = [each for each in preflight(case).issues if each.key == "patch.out.particles"]
+    assert found.severity == "error" and "m across, and no particle fits through; the smallest is" in found.reason
+    mixed = case.with_(bed={"sizes": [[2e-3, 0.5], [4e-3, 0.5]], "count": 10, "start": "suspended"})
+    (found,) = [each for each in preflight(mixed).issues if each.key == "patch.out.particles"]
+    assert found.severity == "warning" and "not every particle fits through; the largest is 0.004 m" in found.reason
+    for free in (case.with_(**{"patch.out.particles": "stay"}), case.with_(**{"bed.diameter": 3e-3})):
+        assert not [each for each in preflight(free).issues if each.key == "patch.out.particles"]
 
 
 def test_openings_are_in_the_text_and_the_drawing_of_a_case(tmp_path: Path) -> None:
@@ -209,21 +283,39 @@ def test_particles_leave_where_they_touch_the_wall_and_lie_within_the_opening(na
     assert wrong.sum() <= (2 if name == "cone" else 0)  # across a cone distances differ by its slope
 
 
-def test_a_bed_overflows_a_weir_and_the_particles_are_counted_with_their_times() -> None:
-    """Two spheres roll to the side, one above the sill and one below it; a third one rests."""
+@pytest.mark.parametrize("name", ["column", "round"])
+def test_a_particle_that_would_touch_and_return_within_a_step_leaves_before_it(name: str) -> None:
+    """At 1.9, 2.1 and -1.9 mm a step towards the wall, with a gap of 2 mm."""
+    case = Case.from_text(TEXT, "c.toml", {"vessel": VESSELS[name], "patch.air.particles": "leave"})
+    touch = 2e-3 if name == "column" else 0.04 - math.sqrt(0.038**2 - 0.003**2)  # 38 mm from the axis, at y
+    spheres = make_particles(np.tile([touch + 2e-3, 0.043, 0.031], (3, 1)), 2e-3, 1000.0)
+    spheres.velocity[:, 0] = -1.9, -2.1, 1.9
+    opening = Opening(case, case.patch["air"])
+    assert not opening.takes(spheres).any()
+    opening.step = 1e-3
+    assert opening.takes(spheres).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("speed", [0.4, 4.0])
+def test_a_bed_overflows_a_weir_and_the_particles_are_counted_with_their_times(speed: float) -> None:
+    """Two spheres roll to the side, one above the sill and one below it; a third one rests. The fast one would cross,
+    touch and return within a step. What it takes along is in the balance."""
     weir = {"kind": "outlet", "side": "x_high", "shape": "box", "centre": [0.02, 0.03], "size": [0.04, 0.02],
             "particles": "leave"}  # fmt: skip
     case = made(
         vessel=None, patch={"weir": weir}, run__until=0.05, fluid__viscosity=1e-9,
         column={"width": 0.04, "height": 0.04, "cell": 0.01, "ends": "closed"},
-        laws={"gravity": [0.0, 0.0, 0.0], "drag": "none"},
+        laws={"gravity": [0.0, 0.0, 0.0]}, run__reference_speed=speed,
         bed={"diameter": 4e-3, "positions": [[0.03, 0.02, 0.03], [0.03, 0.02, 0.0219], [0.01, 0.02, 0.01]],
-             "start": "placed", "initial_velocity": [0.4, 0.0, 0.0]},
+             "start": "placed", "initial_velocity": [speed, 0.0, 0.0]},
     )  # fmt: skip
     simulation = Simulation(case)
-    simulation.until(0.05)
-    found = row(simulation)
+    while simulation.particles.count == 3 and simulation.time < 0.05:
+        simulation.step()
+    found, step = row(simulation), simulation.last_step
+    print(f"{speed * step:.3g} m in a step; imbalance {found['momentum_imbalance']:.2g}")
     assert found["removed_count"] == 1 and simulation.particles.count == 2
-    assert found["residence_time"] == pytest.approx((0.008 - 1e-4) / 0.4, rel=0.02)
+    assert 0.0 <= 0.008 / speed - found["residence_time"] <= 1.1 * step + 1e-4 / speed
+    assert found["momentum_imbalance"] < 1e-12
     assert (simulation.particles.position[:, 0] < 0.038 + 1e-5).all()
     assert outline(case.patch["weir"], (0.02, 0.02))[:, 1].min() == pytest.approx(0.02)

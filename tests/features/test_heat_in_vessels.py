@@ -239,3 +239,13 @@ def test_a_temperature_of_no_inlet_is_refused_with_the_inlets() -> None:
             Case.from_text(CASE, "c.toml", {f"{key}.jet": 0.5})
     with pytest.raises(InputError, match=r"heat.wall_temperature.x_low: must be one of the walls sides, z_low"):
         Case.from_text(CASE, "c.toml", {"heat.wall_temperature.x_low": 350.0})
+
+
+def test_what_enters_by_a_pressure_takes_the_value_of_outlets() -> None:
+    driven = {"patch.nozzle.velocity": None, "patch.nozzle.pressure": 5.0, "patch.annulus.velocity": None,
+              "patch.annulus.pressure": 5.0}  # fmt: skip
+    said = r"heat.patch_temperature.nozzle = 400.0: .*driven by a pressure.*take heat.outlet_temperature"
+    with pytest.raises(InputError, match=said):
+        Case.from_text(CASE, "c.toml", driven)
+    with pytest.raises(InputError, match=r"vapour.patch_fraction.annulus.*take vapour.outlet_fraction"):
+        Case.from_text(CASE, "c.toml", driven | {"heat.patch_temperature": {}})

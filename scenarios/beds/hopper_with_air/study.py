@@ -20,8 +20,10 @@ from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, RED, label, legend, panels, save
 from closures import discharge as laws_of_discharge
-from scenarios.beds.hopper.study import removal_rate
 from scenarios.beds.vessel_slice import draw_spheres, draw_vessel
+
+BLOCKS = 6
+"""Equal parts of the averaging window, whose rates give the error of their mean."""
 
 COLOURS = (BLUE, ORANGE, RED)
 """Of runs, in the order in which they are drawn."""
@@ -33,10 +35,22 @@ class Discharge:
 
     pressure: float  # of the air below the orifice [Pa]
     rate: float  # over the averaging window [kg/s]
-    halves: tuple[float, float]  # over its two halves [kg/s]
+    error: float  # standard error of this mean, by its blocks [kg/s]
     air: float  # superficial velocity of the air through the orifice, upward [m/s]
     gradient: float  # of the pressure in the orifice, positive where it pushes the beads down [Pa/m]
     factor: float  # that this gradient makes by the law, over the discharge without it [-]
+
+    def over(self, other: Discharge) -> tuple[float, float]:
+        """Rate over that of another run, and the error of this ratio [-]."""
+        ratio = self.rate / other.rate
+        return ratio, ratio * math.hypot(self.error / self.rate, other.error / other.rate)
+
+    def line(self) -> str:
+        """The numbers in words."""
+        return (
+            f"{self.pressure:g} Pa: {self.rate:.4f} +- {self.error:.4f} kg/s; air {self.air:.2f} m/s, "
+            f"{self.gradient:.0f} Pa/m, by the law a factor of {self.factor:.2f}"
+        )
 
 
 def case_of(run: RunData) -> Case:
@@ -60,13 +74,14 @@ def beverloo(case: Case) -> float:
 def discharge(run: RunData, case: Case) -> Discharge:
     """Discharge of a run, from the mass that has left through its floor."""
     begin, end = case.run.average_from or 0.5 * case.run.until, case.run.until
-    middle = 0.5 * (begin + end)
-    rate, *halves = (removal_rate(run, *span) for span in ((begin, end), (begin, middle), (middle, end)))
+    edges = np.linspace(begin, end, BLOCKS + 1)
+    rates = np.diff(np.interp(edges, run.history["time"], run.history["removed_mass"])) / np.diff(edges)
+    rate, error = float(rates.mean()), float(rates.std(ddof=1)) / math.sqrt(BLOCKS)
     late = [n for n, time in enumerate(run.times) if time >= begin]
     gradient = float(np.mean([_at_orifice(run, case, n)[0] for n in late]))
     air = float(np.mean([_at_orifice(run, case, n)[1] for n in late]))
     factor = laws_of_discharge.air_factor(gradient / (bulk_of(case) * math.hypot(*case.laws.gravity)))
-    return Discharge(case.patch["orifice"].pressure or 0.0, rate, (halves[0], halves[1]), air, gradient, factor)
+    return Discharge(case.patch["orifice"].pressure or 0.0, rate, error, air, gradient, factor)
 
 
 def _at_orifice(run: RunData, case: Case, n: int) -> tuple[float, float]:
@@ -107,7 +122,11 @@ def figure(runs: Sequence[RunData], path: Path) -> None:
 
 if __name__ == "__main__":
     every = [open_run(folder) for folder in sys.argv[2:]]
-    for each in every:
-        print(discharge(each, case_of(each)))
+    results = [discharge(each, case_of(each)) for each in every]
+    for each in results:
+        print(each.line())
+    for still in (each for each in results if each.pressure == 0.0):
+        for each in (each for each in results if each is not still):
+            print("{:g} Pa over 0 Pa: {:.3f} +- {:.3f}".format(each.pressure, *each.over(still)))
     print(f"without air, by Beverloo: {beverloo(case_of(every[0])):.4g} kg/s")
     figure(every, Path(sys.argv[1]))
