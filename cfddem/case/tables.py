@@ -198,7 +198,7 @@ class CaseTables(Checked):
         """Speed that the highest pressure of a patch gives free fluid up to the lowest, sqrt(2 dp / rho) [m/s]."""
         found = [each.pressure or 0.0 for each in self.patch.values() if each.kind != "wall" and not each.brings]
         found += [0.0] * (self.column.ends == "flow")  # of the lid
-        return math.sqrt(2.0 * (max(found) - min(found)) / self.around.density) if found else 0.0
+        return math.sqrt(2.0 * (max(found) - min(found)) / self.around.density) if self.patch and found else 0.0
 
     @property
     def patches(self) -> dict[str, CasePatch]:
