@@ -90,8 +90,8 @@ def test_a_packed_bed_is_compared_with_ergun(tmp_path: Path) -> None:
 def test_the_pressure_drop_of_a_shallow_packed_bed_says_that_it_is_too_low(tmp_path: Path) -> None:
     """A bed of 40 mm in cells of 10 mm, and of 4 mm. One that is fluidised carries its weight in any cells; one whose
     surface is sharp has its drop in any."""
-    fixed = BED.replace("[run]", "fixed = true\n[run]")
-    sharp = fixed.replace("[laws]", '[laws]\nsurface = "sharp"')
+    sharp = BED.replace("[run]", "fixed = true\n[run]")
+    fixed = sharp.replace("[laws]", '[laws]\nsurface = "smeared"')
     cases = ((fixed, 0.01, True), (fixed, 0.004, False), (BED, 0.01, False), (sharp, 0.01, False))
     for number, (text, cell, said) in enumerate(cases):
         found = report(made_up(tmp_path / str(number), text.replace("cell = 0.005", f"cell = {cell}"))).key_results

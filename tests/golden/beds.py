@@ -190,7 +190,7 @@ def gas_bed_of_many() -> State:
 @golden
 def mixture() -> State:
     steps = {"run__particle_step": 1e-5, "run__fluid_step": 3e-4}
-    return state_of(coupled(MIXTURE, column__height=0.024, run__until=1.0, **steps))
+    return state_of(coupled(MIXTURE, column__height=0.024, run__until=1.0, laws__surface="smeared", **steps))
 
 
 @golden
