@@ -171,8 +171,6 @@ def test_a_registered_law_is_chosen_by_its_name_in_a_case() -> None:
         ({"laws.contact": "hertz"}, "laws.contact_parameters.*left out; hertz has no parameters"),
         ({"laws.contact_parameters.stiffness": 1.0}, "one of loading_stiffness, unloading_stiffness"),
         ({"laws.contact_parameters.loading_stiffness": -1.0}, "loading_stiffness.*at least 0"),
-        ({"laws.normal_stiffness": 1.0}, "written as laws.contact_parameters.normal_stiffness; the key has been"),
-        ({"laws.cohesion": "jkr"}, "written as laws.contact; the key"),
     ],
     ids=str,
 )

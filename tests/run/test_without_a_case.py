@@ -51,6 +51,7 @@ inlet_velocity = 0.05
 drag = "di_felice"
 lubrication = "none"
 agitation = "none"
+surface = "smeared"
 self_disturbance_correction = false
 [run]
 until = 0.01
