@@ -51,6 +51,11 @@ class Column(Checked):
         return self.width, self.width if self.depth is None else self.depth, self.height
 
     @property
+    def cell_edges(self) -> Point:
+        """Edges of a cell (x, y, z) [m]."""
+        return self.cell if isinstance(self.cell, tuple) else (self.cell, self.cell, self.cell)
+
+    @property
     def periodic(self) -> tuple[bool, bool, bool]:
         """Whether x, y, z are periodic."""
         return self.sides == "periodic", (self.front or self.sides) == "periodic", self.ends == "periodic"

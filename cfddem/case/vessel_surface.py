@@ -122,5 +122,6 @@ def _closed(vessel: CaseVessel, column: Any, _: tuple[int, int]) -> ClosedSurfac
     if column.ends == "flow" and (low[2] > near or high[2] < size[2] - near):
         raise InputError("column.ends", "flow", f'"closed" with a vessel that does not reach from the floor, 0, to the '
                          f"lid, {size[2]:g} m", f"it reaches from {low[2]:.4g} to {high[2]:.4g} m")  # fmt: skip
-    cells = column.cell if isinstance(column.cell, tuple) else (column.cell,)
-    return closed_surface(through_ends(corners, float(size[2]), BEYOND * max(cells)), "vessel.file", vessel.file)
+    return closed_surface(
+        through_ends(corners, float(size[2]), BEYOND * max(column.cell_edges)), "vessel.file", vessel.file
+    )

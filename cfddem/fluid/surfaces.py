@@ -154,14 +154,7 @@ class Together:
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: that of the nearest wall."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        nearest, found = np.full(shape, np.inf), [np.zeros(shape) for _ in range(3)]
-        for wall in self.walls:
-            away = np.abs(wall.distance(x, y, z))
-            for d, component in enumerate(wall.velocity(x, y, z)):
-                found[d] = np.where(away < nearest, component, found[d])
-            nearest = np.minimum(nearest, away)
-        return found[0], found[1], found[2]
+        return _of_first(self.walls, [np.abs(wall.distance(x, y, z)) for wall in self.walls], x, y, z)
 
 
 @dataclass(frozen=True)
@@ -179,14 +172,20 @@ class Joined:
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: that of the wall whose distance counts."""
-        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        farthest, found = np.full(shape, -np.inf), [np.zeros(shape) for _ in range(3)]
-        for wall in self.walls:
-            away = wall.distance(x, y, z)
-            for d, component in enumerate(wall.velocity(x, y, z)):
-                found[d] = np.where(away > farthest, component, found[d])
-            farthest = np.maximum(farthest, away)
-        return found[0], found[1], found[2]
+        return _of_first(self.walls, [-wall.distance(x, y, z) for wall in self.walls], x, y, z)
+
+
+def _of_first(
+    walls: Sequence[Surface], ranks: Sequence[Array], x: Array, y: Array, z: Array
+) -> tuple[Array, Array, Array]:
+    """Velocity of the wall of the lowest rank at every place; of equal ranks, that of the first."""
+    shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+    lowest, velocity = np.full(shape, np.inf), [np.zeros(shape) for _ in range(3)]
+    for wall, rank in zip(walls, ranks):
+        for d, component in enumerate(wall.velocity(x, y, z)):
+            velocity[d] = np.where(rank < lowest, component, velocity[d])
+        lowest = np.minimum(lowest, rank)
+    return velocity[0], velocity[1], velocity[2]
 
 
 def cylinder(

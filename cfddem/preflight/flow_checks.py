@@ -49,8 +49,7 @@ def suggested_cell(case: Case, wanted: float | None = None) -> str:
 
     wanted  size that it should have; default: that of the case [m]
     """
-    given = case.column.cell if isinstance(case.column.cell, tuple) else (case.column.cell,) * 3
-    widths = given if wanted is None else (wanted,) * 3
+    widths = case.column.cell_edges if wanted is None else (wanted,) * 3
     return suggested_cells(case.column.size, widths, lambda edge: not any(_check_smallest_cell(case, edge, False)))
 
 

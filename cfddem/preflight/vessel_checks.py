@@ -40,8 +40,7 @@ def check_vessel(case: Case) -> Iterator[Issue]:
         )  # fmt: skip
     if not case.fluid:
         return
-    cell = case.column.cell
-    widest = max(cell[0], cell[1]) if isinstance(cell, tuple) else cell
+    widest = max(case.column.cell_edges[:2])
     if 0.0 < narrow < FEWEST_ACROSS * widest:
         yield Issue(
             "warning", f"vessel.{key}",
@@ -108,7 +107,7 @@ def _check_drain(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
 
 def _check_opening(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
     """Check that cells resolve an opening in the wall of a vessel."""
-    spacing = _spacing(case)
+    spacing = case.column.cell_edges
     edges = patch.size or 2 * (patch.diameter or math.inf,)
     narrow = min(edge / spacing[d] for edge, d in zip(edges, along(patch.side)))
     if patch in case.openings and narrow < FEWEST_OF_OPENING:
@@ -117,12 +116,6 @@ def _check_opening(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
             f"{narrow:.2g} cells across; the flow through an opening in a vessel needs at least {FEWEST_OF_OPENING:g}",
             "make it larger, or the cells smaller",
         )  # fmt: skip
-
-
-def _spacing(case: Case) -> tuple[float, float, float]:
-    """Edges of a cell along x, y, z [m]."""
-    cell = case.column.cell
-    return cell if isinstance(cell, tuple) else (cell, cell, cell)
 
 
 def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:

@@ -112,9 +112,8 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
 
 def cells_across(case: Case, wall: CaseWall) -> float:
     """Cells across the narrowest part of an open wall."""
-    cell, own = case.column.cell, wall.radius or 0.0
-    widest = max(cell) if isinstance(cell, tuple) else cell
-    return 2.0 * min(own, wall.top_radius or own) / widest
+    own = wall.radius or 0.0
+    return 2.0 * min(own, wall.top_radius or own) / max(case.column.cell_edges)
 
 
 def area_by_cells(case: Case, wall: CaseWall) -> float:
