@@ -66,10 +66,10 @@ def check(law: Callable[..., float]) -> list[str]:
     jumps by -73 % at voidage = 0.8 (reynolds = 1e+03)
     """
     entry = law_of(law)
-    found = list(_declared(entry)) or list(_finite(entry))
-    if not found:
-        found = [*_same_compiled(entry), *REQUIREMENTS.get(entry.kind, _none)(entry)]
-    return found
+    problems = list(_declared(entry)) or list(_finite(entry))
+    if not problems:
+        problems = [*_same_compiled(entry), *REQUIREMENTS.get(entry.kind, _none)(entry)]
+    return problems
 
 
 def _arguments(entry: Law) -> list[str]:
@@ -96,10 +96,10 @@ def _declared(entry: Law) -> Iterator[str]:
     """Arguments of a user's law that nothing can give, or that are missing; helpers of built-in laws take others."""
     if entry.kind in ARGUMENTS and not is_built_in(entry.function):
         (may, must), names = ARGUMENTS[entry.kind], _arguments(entry)
-        odd, missing = [each for each in names if each not in may], [each for each in must if each not in names]
+        odd, missing = [name for name in names if name not in may], [name for name in must if name not in names]
         if odd or missing:
-            what = f"takes {', '.join(odd)}" if odd else f"does not take {', '.join(missing)}"
-            yield f"{what}: not a law of kind {entry.kind}, {arguments_of(entry.kind)}"
+            difference = f"takes {', '.join(odd)}" if odd else f"does not take {', '.join(missing)}"
+            yield f"{difference}: not a law of kind {entry.kind}, {arguments_of(entry.kind)}"
 
 
 def _finite(entry: Law) -> Iterator[str]:
@@ -226,12 +226,12 @@ def _creeping_bed(voidages: list[float], factor: Curve) -> Iterator[str]:
 
 
 def _not_monotone(
-    what: str, name: str, values: list[float], other: str, others: list[float], curve_at: Callable[[float], Curve]
+    complaint: str, name: str, values: list[float], other: str, others: list[float], curve_at: Callable[[float], Curve]
 ) -> Iterator[str]:
     for fixed in others:
         place = _first_decrease(values, curve_at(fixed))
         if place is not None:
-            yield f"{what} {name} at {name} = {place:.3g} ({other} = {fixed:.3g})"
+            yield f"{complaint} {name} at {name} = {place:.3g} ({other} = {fixed:.3g})"
             return
 
 

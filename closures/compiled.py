@@ -50,13 +50,13 @@ def source_key() -> str:
 def _compiled_from(sources: Mapping[str, str]) -> set[str]:
     """Names of the modules that compiled code may come from, among all modules and their texts."""
     todo = [name for name, text in sources.items() if name.startswith("closures") or _COMPILES.search(text)]
-    found = set(todo)
+    reached = set(todo)
     while todo:
         for module, names in _IMPORTS.findall(sources[todo.pop()]):
             imported = {module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))} & sources.keys()
-            todo += imported - found
-            found |= imported
-    return found
+            todo += imported - reached
+            reached |= imported
+    return reached
 
 
 def _writable(folder: Path) -> bool:

@@ -56,10 +56,10 @@ class _CalledCode(JITCodeLibrary):  # type: ignore[misc]
 
     def _finalize_specific(self) -> None:
         super()._finalize_specific()  # type: ignore[no-untyped-call]
-        for each in self._final_module.global_variables:
-            environment = lookup_environment(each.name)  # type: ignore[no-untyped-call]
+        for variable in self._final_module.global_variables:
+            environment = lookup_environment(variable.name)  # type: ignore[no-untyped-call]
             if environment is not None:
-                self._codegen.set_env(each.name, environment)  # type: ignore[attr-defined]
+                self._codegen.set_env(variable.name, environment)  # type: ignore[attr-defined]
 
 
 class Linked(Compiler):  # type: ignore[misc]

@@ -245,5 +245,5 @@ def speed_after_short_step(
         shortly = low > minimum_gap and high < cutoff_gap and high - low <= 0.1 * low
     else:
         shortly = high <= minimum_gap and (end >= 0.0 if gap > 0.0 else end <= 0.0)
-    found = not inside or 4.0 * bent * bent * abs(correction) <= 1e-14 * (abs(speed) + abs(guess))
-    return guess if shortly and found and discriminant >= 0.0 else math.nan
+    converged = not inside or 4.0 * bent * bent * abs(correction) <= 1e-14 * (abs(speed) + abs(guess))
+    return guess if shortly and converged and discriminant >= 0.0 else math.nan

@@ -102,9 +102,9 @@ def _refuse_impossible(entry: Law) -> None:
     load_built_in_laws()
     if entry.kind not in REGISTRY:
         raise ValueError(f"{entry.name}: kind = {entry.kind!r}: must be one of {', '.join(REGISTRY)}")
-    known = REGISTRY[entry.kind].get(entry.name)
-    if known is not None and is_built_in(known.function):
-        module = known.function.__module__
+    earlier = REGISTRY[entry.kind].get(entry.name)
+    if earlier is not None and is_built_in(earlier.function):
+        module = earlier.function.__module__
         raise ValueError(f"{entry.name} is built in ({module}); choose another name")
     if entry.name in BUILT_IN.get(entry.kind, ()):
         raise ValueError(f"{entry.name} has another meaning in laws.{entry.kind}; choose another name")
@@ -118,7 +118,9 @@ def _refuse_impossible(entry: Law) -> None:
 
 def _is_range(limits: Any) -> bool:
     pair = (
-        isinstance(limits, tuple | list) and len(limits) == 2 and all(isinstance(each, int | float) for each in limits)
+        isinstance(limits, tuple | list)
+        and len(limits) == 2
+        and all(isinstance(limit, int | float) for limit in limits)
     )
     return pair and bool(limits[0] < limits[1])
 

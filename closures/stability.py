@@ -112,8 +112,8 @@ class UniformBed:
             fluid_rate = rate + 1j * number * slip  # in the frame of the fluid
             fluid = smoothed * fluid_rate / (1j * number * self.voidage)
             particles = -rate / (1j * number * solid)
-            seen = smoothed * fluid - particles
-            force = (drag + by_slip * slip) * seen - by_voidage * smoothed**2 * slip
+            passing = smoothed * fluid - particles
+            force = (drag + by_slip * slip) * passing - by_voidage * smoothed**2 * slip
             carried = self.added_mass * self.fluid_density * (smoothed * fluid_rate * fluid - rate * particles)
             inertia = self.fluid_density * self.voidage * fluid_rate * fluid
             weight = smoothed * solid * drag * slip / self.voidage

@@ -60,16 +60,16 @@ class Communicator:
 
         rows, kept = _rows(array.astype(float, copy=False), axis)
         if self.size == 1:  # the same in one call
-            found = np.empty(len(rows))
-            sums_of_rows(rows, rows.view(np.int64), found, found.view(np.int64))
-            return found.reshape(kept) if kept else float(found[0])
+            of_rows = np.empty(len(rows))
+            sums_of_rows(rows, rows.view(np.int64), of_rows, of_rows.view(np.int64))
+            return of_rows.reshape(kept) if kept else float(of_rows[0])
         most, parts = np.zeros(len(rows)), np.zeros((2, len(rows)), np.int64)
         largest_of_rows(rows.view(np.int64), most.view(np.int64))
         most = self._largest(most)
         units = [unit_of(size) if math.isfinite(size) else 0.0 for size in most.tolist()]
         split(rows, np.array(units), parts)
         whole, fine = self._add(parts).tolist()
-        sums = [put_together(each, unit) if unit > 0.0 else math.nan for *each, unit in zip(whole, fine, units)]
+        sums = [put_together(pieces, unit) if unit > 0.0 else math.nan for *pieces, unit in zip(whole, fine, units)]
         return np.array(sums).reshape(kept) if kept else sums[0]
 
     def largest(self, values: ArrayLike, axis: Axis = None, *, default: float = -np.inf) -> Any:
@@ -77,13 +77,13 @@ class Communicator:
 
         default  contribution of a rank without elements
         """
-        found = array = np.asarray(values)
+        tops = array = np.asarray(values)
         if not array.size:
-            found = np.full(array.sum(axis=axis).shape, default)
+            tops = np.full(array.sum(axis=axis).shape, default)
         elif axis != ():
-            found = np.maximum.reduce(array, axis=tuple(range(array.ndim)) if axis is None else axis)
-        whole = self._largest(np.asarray(found, float))
-        return _plain(whole if found.dtype.kind == "f" else whole.astype(found.dtype))
+            tops = np.maximum.reduce(array, axis=tuple(range(array.ndim)) if axis is None else axis)
+        whole = self._largest(np.asarray(tops, float))
+        return _plain(whole if tops.dtype.kind == "f" else whole.astype(tops.dtype))
 
     def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:
         """Smallest element of the arrays of all ranks; NaN if any element is NaN.
@@ -198,7 +198,7 @@ def _rows(array: np.ndarray, axis: Axis) -> tuple[np.ndarray, tuple[int, ...]]:
     """An array as rows of what is summed over some axes (k, n), and the shape of the axes that stay."""
     if axis is None:
         return np.ascontiguousarray(array).reshape(1, -1), ()
-    summed = {each % array.ndim for each in ((axis,) if isinstance(axis, int) else axis)}
+    summed = {number % array.ndim for number in ((axis,) if isinstance(axis, int) else axis)}
     stay = [d for d in range(array.ndim) if d not in summed]
     kept = tuple(array.shape[d] for d in stay)
     count = math.prod(array.shape[d] for d in summed)

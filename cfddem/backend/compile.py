@@ -149,8 +149,8 @@ def _linked(function: Callable[..., Any], **options: Any) -> Any:
     """A function for other loops, compiled once for all values of a number that they give it as a constant."""
     compiled = njit(**PART, **options)(function)
     if hasattr(compiled, "get_call_template"):  # compilation is switched on
-        found = compiled.get_call_template
-        compiled.get_call_template = lambda args, kws: found(tuple(map(unliteral, args)), kws)
+        template_of = compiled.get_call_template
+        compiled.get_call_template = lambda args, kws: template_of(tuple(map(unliteral, args)), kws)
     return compiled
 
 
@@ -242,11 +242,11 @@ def _most_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
-def announced(what: str) -> None:
+def announced(message: str) -> None:
     """Show which loop is being compiled on a terminal; elsewhere say once that loops are compiled."""
     if sys.stderr.isatty():
-        print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
-    elif what and _compilation.compiled == 1:
+        print(f"\r{message:<60}\r", end="", file=sys.stderr, flush=True)
+    elif message and _compilation.compiled == 1:
         print("cfddem: compiling loops, up to two minutes the first time", file=sys.stderr, flush=True)
 
 
@@ -261,7 +261,7 @@ class _Compilation(event.Listener):
         self.seconds, self.begun = 0.0, 0.0
         self.progress: Callable[[str], None] | None = None
 
-    def on_start(self, seen: event.Event) -> None:
+    def on_start(self, started: event.Event) -> None:
         """A compilation begins. Helpers are compiled within the loop that calls them and are not counted."""
         self.depth += 1
         if self.depth > 1:
@@ -273,7 +273,7 @@ class _Compilation(event.Listener):
             self.compiled += 1
             self.progress(f"compiling loop {self.compiled} (kept for next time) ...")
 
-    def on_end(self, seen: event.Event) -> None:
+    def on_end(self, ended: event.Event) -> None:
         """A compilation has ended."""
         self.depth -= 1
         if self.depth > 0:
@@ -327,11 +327,11 @@ class SharedCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The code for some arguments; None if this process is to compile it, with all others locked out."""
-        found = super().load_overload(sig, target_context)
-        if found is None and not self._locked:
+        overload = super().load_overload(sig, target_context)
+        if overload is None and not self._locked:
             self._locked = _lock(self._place)
-            found = super().load_overload(sig, target_context)
-        return found
+            overload = super().load_overload(sig, target_context)
+        return overload
 
     def end(self) -> None:
         """The compiler has returned or failed."""

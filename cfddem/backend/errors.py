@@ -66,7 +66,7 @@ def failure_elsewhere(message: str, exit_code: int) -> CfddemError:
     return failure
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
+def nearest(word: str, allowed: Iterable[str]) -> str:
     """The limit to state for an unknown word: all known words, or the nearest of many, and the nearest one.
 
     >>> nearest("restituton", ["friction", "restitution"])
@@ -74,7 +74,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
     >>> nearest("DiFeliceDrag", ["di_felice", "gidaspow"])
     "one of di_felice, gidaspow (did you mean 'di_felice'?)"
     """
-    words = list(known)
+    words = list(allowed)
     close = get_close_matches(word, words, n=3) or get_close_matches(_plain_name(word), words, n=3)
     shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
     more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""

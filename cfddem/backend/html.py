@@ -96,9 +96,9 @@ def _parts(value: Any, key: str) -> Iterator[tuple[str, BaseModel]]:
     if isinstance(value, BaseModel):
         yield key, value
     elif isinstance(value, Mapping):
-        yield from ((f"{key}.{name}", each) for name, each in value.items() if isinstance(each, BaseModel))
+        yield from ((f"{key}.{name}", model) for name, model in value.items() if isinstance(model, BaseModel))
     elif isinstance(value, tuple):
-        yield from ((f"{key}[{k}]", each) for k, each in enumerate(value) if isinstance(each, BaseModel))
+        yield from ((f"{key}[{k}]", model) for k, model in enumerate(value) if isinstance(model, BaseModel))
 
 
 def _text(value: Any) -> str:

@@ -32,9 +32,9 @@ def plain(value: Any) -> Any:
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, Mapping):
-        return {str(name): plain(each) for name, each in value.items()}
+        return {str(name): plain(content) for name, content in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [plain(each) for each in value]
+        return [plain(element) for element in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
@@ -44,4 +44,4 @@ def plain(value: Any) -> Any:
 
 def summary_of(result: Any) -> dict[str, Any]:
     """The values of a dataclass that `repr` shows, in the types of JSON."""
-    return {each.name: plain(getattr(result, each.name)) for each in fields(result) if each.repr}
+    return {field.name: plain(getattr(result, field.name)) for field in fields(result) if field.repr}

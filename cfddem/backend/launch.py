@@ -97,10 +97,10 @@ def find_launcher() -> Path:
     errors  InputError if there is none
     """
     beside = Path(sys.executable).parent
-    found = shutil.which("mpiexec", path=str(beside)) or shutil.which("mpiexec") or shutil.which("mpirun")
-    if found is None:
+    launcher = shutil.which("mpiexec", path=str(beside)) or shutil.which("mpiexec") or shutil.which("mpirun")
+    if launcher is None:
         raise InputError("mpiexec", None, "on the path", INSTALL)
-    return Path(found)
+    return Path(launcher)
 
 
 def launch_command(ranks: int, command: Sequence[str], environment: Mapping[str, str] = os.environ) -> list[str]:

@@ -38,8 +38,8 @@ def _can_be_called(kind: str, entry: Law) -> bool:
 
 def called_by_name(law: Callable[..., float], names: Sequence[str], numbers: Sequence[float]) -> float:
     """Value of a law that takes some of these arguments, in any order."""
-    known = dict(zip(names, numbers))
-    return law(**{name: known[name] for name in inspect.signature(law).parameters})
+    values = dict(zip(names, numbers))
+    return law(**{name: values[name] for name in inspect.signature(law).parameters})
 
 
 class NotInstalled(str):
@@ -70,8 +70,8 @@ def drag_by_name(law: Law, diameter_ratio: float = 1.0) -> Callable[[float, floa
     return factor
 
 
-def _not_finite(law: Law, what: str, reynolds: float, voidage: float) -> InputError:
-    remedy = f"{what} at Re = {reynolds:.3g}, voidage = {voidage:.3g}"
+def _not_finite(law: Law, result: str, reynolds: float, voidage: float) -> InputError:
+    remedy = f"{result} at Re = {reynolds:.3g}, voidage = {voidage:.3g}"
     return InputError("laws.drag", law.name, "a law that is finite in the bed and beside it", remedy)
 
 
@@ -80,11 +80,11 @@ def _named(kind: str, name: str) -> Law:
     laws = registry.REGISTRY[kind]
     failures = {} if name in laws else registry.load_package_laws()
     if name not in laws:
-        known = [*BUILT_IN[kind], *(each.name for each in laws.values() if _can_be_called(kind, each))]
+        choices = [*BUILT_IN[kind], *(law.name for law in laws.values() if _can_be_called(kind, law))]
         remedy = "cfddem explain lists all laws; name the file of one of your own with --laws FILE.py"
         lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
         remedy = "; ".join([remedy, *lost])
-        raise InputError(kind, shown(name), nearest(name, dict.fromkeys(known)), remedy)
+        raise InputError(kind, shown(name), nearest(name, dict.fromkeys(choices)), remedy)
     return laws[name]
 
 

@@ -91,8 +91,8 @@ class _Specialiser:
             if isinstance(value, Slot):
                 value = self.choices.get(value.name, value)  # empty slots are behind an `if` that is not compiled
                 bound[name] = self.of(value) if _is_compiled(value) else value
-            elif _is_compiled(value) and (made := self.of(value)) is not value:
-                bound[name] = made
+            elif _is_compiled(value) and (copy := self.of(value)) is not value:
+                bound[name] = copy
         how = template.compiled_as
         if self.threads:
             how = _ON_ALL_THREADS.get(how, how)
@@ -100,9 +100,9 @@ class _Specialiser:
             return template
         tag = _digest([how.__name__, *(f"{name}={fingerprint(bound[name])}" for name in sorted(bound))])
         if (plain, tag) not in _COPIES:
-            made = how(renamed(plain, f"{plain.__name__}_{tag}", bound))
-            made.tag = tag
-            _COPIES[plain, tag] = made
+            copy = how(renamed(plain, f"{plain.__name__}_{tag}", bound))
+            copy.tag = tag
+            _COPIES[plain, tag] = copy
         return _COPIES[plain, tag]
 
 
@@ -158,15 +158,15 @@ def compile_source(source: str, how: Callable[..., Any] = inline, **names: Any) 
     """
     scope: dict[str, Any] = {"__name__": __name__}
     exec(source, scope)
-    made: FunctionType = next(value for value in scope.values() if isinstance(value, FunctionType))
-    made.__globals__.update(names)
-    return how(made)
+    function: FunctionType = next(value for value in scope.values() if isinstance(value, FunctionType))
+    function.__globals__.update(names)
+    return how(function)
 
 
-def check_compiles(what: str, law: Callable[..., Any]) -> None:
+def check_compiles(key: str, law: Callable[..., Any]) -> None:
     """Refuse a user's law that cannot be compiled, by its name.
 
-    what  the law is chosen for, as in a case
+    key  for which the law is chosen, as in a case
     """
     loop = callable_in_loops(law)
     if not hasattr(loop, "compile"):  # compilation is switched off
@@ -174,7 +174,7 @@ def check_compiles(what: str, law: Callable[..., Any]) -> None:
     try:
         loop.compile((float64,) * len(inspect.signature(law).parameters))
     except Exception as refusal:
-        raise InputError(what, law.__name__, "a law that can be compiled", first_cause(refusal)) from None
+        raise InputError(key, law.__name__, "a law that can be compiled", first_cause(refusal)) from None
 
 
 def fingerprint(value: Any) -> str:
@@ -182,7 +182,7 @@ def fingerprint(value: Any) -> str:
     return _digest(_parts(value, set()))
 
 
-def _parts(value: Any, seen: set[int]) -> Iterator[str]:
+def _parts(value: Any, visited: set[int]) -> Iterator[str]:
     if isinstance(value, FunctionType) or hasattr(value, "py_func"):
         plain = _plain(value)
         has_file = not plain.__code__.co_filename.startswith("<")
@@ -190,22 +190,22 @@ def _parts(value: Any, seen: set[int]) -> Iterator[str]:
             yield f"{plain.__module__}.{plain.__name__}"
             return
         yield plain.__name__ if "<" in plain.__name__ else plain.__qualname__
-        if id(plain) in seen:
+        if id(plain) in visited:
             return
-        seen.add(id(plain))
+        visited.add(id(plain))
         yield from _code_parts(plain.__code__)
-        for each in (*(plain.__defaults__ or ()), *(cell.cell_contents for cell in plain.__closure__ or ())):
-            yield from _parts(each, seen)
+        for referred in (*(plain.__defaults__ or ()), *(cell.cell_contents for cell in plain.__closure__ or ())):
+            yield from _parts(referred, visited)
         names = _names(plain.__code__)
         for name in names:
             if name in plain.__globals__:
                 yield name
-                yield from _referred(plain.__globals__[name], names, seen)
+                yield from _referred(plain.__globals__[name], names, visited)
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype}{value.shape}{_digest([value.tobytes().hex()])}"
     elif isinstance(value, tuple | list):
-        for each in value:
-            yield from _parts(each, seen)
+        for element in value:
+            yield from _parts(element, visited)
     elif value is None or isinstance(value, bool | int | float | complex | str | bytes | np.generic):
         yield repr(value)
     else:
@@ -213,15 +213,15 @@ def _parts(value: Any, seen: set[int]) -> Iterator[str]:
         yield f"{getattr(value, '__module__', '')}.{name}"
 
 
-def _referred(value: Any, names: list[str], seen: set[int]) -> Iterator[str]:
+def _referred(value: Any, names: list[str], visited: set[int]) -> Iterator[str]:
     """Parts of a global value; of a module those attributes that the function may use."""
     if not isinstance(value, ModuleType):
-        yield from _parts(value, seen)
+        yield from _parts(value, visited)
     elif value.__name__.partition(".")[0] not in sys.stdlib_module_names | {"numpy"}:
         for name in names:
             if hasattr(value, name):
                 yield f"{value.__name__}.{name}"
-                yield from _parts(getattr(value, name), seen)
+                yield from _parts(getattr(value, name), visited)
 
 
 def _code_parts(code: CodeType) -> Iterator[str]:
@@ -236,7 +236,7 @@ def _code_parts(code: CodeType) -> Iterator[str]:
 
 def _names(code: CodeType) -> list[str]:
     """Names that a function's code may look up, those of its inner functions included."""
-    inner = [name for each in code.co_consts if isinstance(each, CodeType) for name in _names(each)]
+    inner = [name for constant in code.co_consts if isinstance(constant, CodeType) for name in _names(constant)]
     return list(dict.fromkeys([*code.co_names, *inner]))
 
 
@@ -250,6 +250,6 @@ def _is_compiled(value: Any) -> bool:
 
 def _digest(parts: Any) -> str:
     digest = hashlib.sha256()
-    for each in parts:
-        digest.update(each.encode() + b"\n")
+    for text in parts:
+        digest.update(text.encode() + b"\n")
     return digest.hexdigest()[:12]

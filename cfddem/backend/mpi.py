@@ -56,9 +56,9 @@ class Ranks(Communicator):
 
     def _given_by_all(self, numbers: np.ndarray) -> np.ndarray:
         """See `Communicator._given_by_all`."""
-        given = np.empty_like(numbers)
-        self.world.Alltoall(numbers, given)
-        return given
+        received = np.empty_like(numbers)
+        self.world.Alltoall(numbers, received)
+        return received
 
     def joined(self, rows: np.ndarray) -> np.ndarray:
         """See `Communicator.joined`."""
@@ -89,15 +89,15 @@ class Ranks(Communicator):
     def _largest(self, values: np.ndarray) -> np.ndarray:
         """See `Communicator._largest`; MPI does not say what the largest of NaN and a number is."""
         missing = np.isnan(values)
-        found = np.stack([np.where(missing, -np.inf, values), missing])
-        self.world.Allreduce(MPI.IN_PLACE, found, MPI.MAX)
-        return np.where(found[1] > 0.0, np.nan, found[0])
+        extremes = np.stack([np.where(missing, -np.inf, values), missing])
+        self.world.Allreduce(MPI.IN_PLACE, extremes, MPI.MAX)
+        return np.where(extremes[1] > 0.0, np.nan, extremes[0])
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         """See `Communicator`."""
         total, *others = self.world.allgather(local)
-        for each in others:
-            total = operation(total, each)
+        for term in others:
+            total = operation(total, term)
         return total
 
 
@@ -109,9 +109,11 @@ def _bytes(rows: np.ndarray) -> np.ndarray:
 def try_out(world: Any = None) -> str:
     """Exchange ghosts and a sum between all ranks; returns what was found, with the time of each."""
     ranks = Ranks(world)
-    found = (ranks.size + 1) * ranks.size // 2
-    if ranks.sum([ranks.rank + 1]) != found:
-        raise RunFailed(f"the sum over {ranks.size} ranks is not {found}: launcher and mpi4py belong to different MPIs")
+    expected = (ranks.size + 1) * ranks.size // 2
+    if ranks.sum([ranks.rank + 1]) != expected:
+        raise RunFailed(
+            f"the sum over {ranks.size} ranks is not {expected}: launcher and mpi4py belong to different MPIs"
+        )
     outgoing = {rank: np.full(TRIAL, 1.0 + ranks.rank) for rank in range(ranks.size)}
     incoming = {rank: np.zeros(TRIAL) for rank in range(ranks.size)}
     times = np.empty((2, TRIES))

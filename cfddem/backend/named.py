@@ -21,9 +21,9 @@ def named_arrays(kind: str, names: tuple[str, ...]) -> Any:
 
     kind  what they are; the name of the class consists of it and the names of the members, see `__getattr__`
     """
-    made = namedtuple("__".join((kind, *names)), names)  # type: ignore[misc]
-    made.__module__ = __name__
-    return globals().setdefault(made.__name__, made)
+    structure = namedtuple("__".join((kind, *names)), names)  # type: ignore[misc]
+    structure.__module__ = __name__
+    return globals().setdefault(structure.__name__, structure)
 
 
 def __getattr__(name: str) -> Any:

@@ -56,9 +56,9 @@ def rows_by_id(values: np.ndarray, ids: np.ndarray, communicator: Communicator) 
         row = 0
         for first in range(0, end, step):
             begin, last = np.searchsorted(ordered, [first, first + step])
-            found = communicator.gathered(ordered[begin:last])
+            keys = communicator.gathered(ordered[begin:last])
             rows = communicator.gathered(values[order[begin:last]])
-            yield slice(row, row + len(rows)), rows[np.argsort(found, kind="stable")]
+            yield slice(row, row + len(rows)), rows[np.argsort(keys, kind="stable")]
             row += len(rows)
 
     return Portions((count, *values.shape[1:]), values.dtype, parts)
@@ -101,8 +101,8 @@ def slices(count: int, width: int = 1, largest: int = 0) -> Iterator[slice]:
 def take_part(values: Any) -> None:
     """Give rank 0 what it asks for where it goes through these values, nested mappings of `Portions` and others."""
     if isinstance(values, Mapping):
-        for each in values.values():
-            take_part(each)
+        for array in values.values():
+            take_part(array)
     elif isinstance(values, Portions):
         for _ in values:
             pass
@@ -111,7 +111,7 @@ def take_part(values: Any) -> None:
 def collected(values: Any, communicator: Communicator) -> Any:
     """The same values with whole arrays, on all ranks."""
     if isinstance(values, Mapping):
-        return {name: collected(each, communicator) for name, each in values.items()}
+        return {name: collected(array, communicator) for name, array in values.items()}
     if not isinstance(values, Portions):
         return values
     whole = np.empty(values.shape if communicator.rank == 0 else 0, values.dtype)

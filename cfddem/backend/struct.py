@@ -33,31 +33,32 @@ Made = TypeVar("Made", bound=type)
 class Struct(types.Type):  # type: ignore[misc]
     """Type of a named tuple that is taken by reference.
 
-    made     its class
-    members  types of its members
+    python_class  its class
+    members       types of its members
     """
 
-    def __init__(self, made: type, members: tuple[types.Type, ...]) -> None:
-        self.made, self.members = made, members
-        digest = hashlib.sha256(", ".join(map(str, (made, *members))).encode()).hexdigest()[:16]
-        super().__init__(name=f"{made.__name__[:20]}_{digest}")  # short: it becomes part of the names of functions
+    def __init__(self, python_class: type, members: tuple[types.Type, ...]) -> None:
+        self.python_class, self.members = python_class, members
+        digest = hashlib.sha256(", ".join(map(str, (python_class, *members))).encode()).hexdigest()[:16]
+        # short: it becomes part of the names of functions
+        super().__init__(name=f"{python_class.__name__[:20]}_{digest}")
 
     @property
     def key(self) -> Any:
         """What tells it from other types."""
-        return self.made, self.members
+        return self.python_class, self.members
 
 
-def struct(made: Made) -> Made:
+def struct(python_class: Made) -> Made:
     """Let compiled loops take instances of a class of named tuples by reference."""
-    typeof_impl.register(made)(lambda value, context: _type_of(value, context))
-    return made
+    typeof_impl.register(python_class)(lambda value, context: _type_of(value, context))
+    return python_class
 
 
 def _type_of(value: Any, context: Any, whole: bool = True) -> types.Type:
     """Type of a structure, or of a member where `whole` is not set: numbers without arrays are read by value."""
     if hasattr(value, "_fields") and (whole or not _of_numbers(value)):
-        return Struct(type(value), tuple(_type_of(each, context, False) for each in value))
+        return Struct(type(value), tuple(_type_of(member, context, False) for member in value))
     return typeof_impl(value, context)
 
 
@@ -69,7 +70,7 @@ def _content(manager: Any, of: types.Type) -> Any:
     """What lies at the address of a structure, or of another member."""
     if not isinstance(of, Struct):
         return manager.lookup(of).get_value_type()
-    return ir.LiteralStructType([_content(manager, each) for each in of.members])
+    return ir.LiteralStructType([_content(manager, member) for member in of.members])
 
 
 @register_model(Struct)
@@ -101,14 +102,14 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
 
     def generic_resolve(self, of: Struct, name: str) -> types.Type | None:  # type: ignore[override]
         """Type of a member."""
-        names = of.made._fields  # type: ignore[attr-defined]
+        names = of.python_class._fields  # type: ignore[attr-defined]
         return of.members[names.index(name)] if name in names else None
 
 
 @lower_getattr_generic(Struct)
 def _read(context: Any, builder: Any, of: Struct, address: Any, name: str) -> Any:
     """A member: what it holds, or its address where it is a structure."""
-    place = of.made._fields.index(name)  # type: ignore[attr-defined]
+    place = of.python_class._fields.index(name)  # type: ignore[attr-defined]
     member, inner = of.members[place], _member(context, builder, of, address, place)
     if isinstance(member, Struct):
         return inner
@@ -134,10 +135,10 @@ def _loaded_row(context: Any, builder: Any, member: types.Array, address: Any) -
     """An array with one axis: only what its type does not tell is read, as most of the text of a loop is such reads."""
     model, row = context.data_model_manager[member], address.type.pointee
     size = cgutils.intp_t(context.get_abi_sizeof(context.get_data_type(member.dtype)))
-    known = {"itemsize": size, "strides": ir.Constant(row.elements[model.get_field_position("strides")], [size])}
+    strides = {"itemsize": size, "strides": ir.Constant(row.elements[model.get_field_position("strides")], [size])}
     names = [model.get_field_position(name) for name in ("meminfo", "data", "nitems", "shape")]
-    parts = [ir.Constant(each, None) for each in row.elements]
-    for name, number in known.items():
+    parts = [ir.Constant(length, None) for length in row.elements]
+    for name, number in strides.items():
         parts[model.get_field_position(name)] = number
     value = ir.Constant(row, parts)
     for place in names:
@@ -154,12 +155,12 @@ def _taken(of: Struct, value: Any, c: Any) -> NativeValue:
     releases: list[Any] = []
     _fill(of, value, address, c, failures, releases)
     failed = cgutils.false_bit
-    for each in failures:
-        failed = c.builder.or_(failed, each)
+    for failure in failures:
+        failed = c.builder.or_(failed, failure)
 
     def release() -> None:
-        for each in reversed(releases):
-            each()
+        for release_member in reversed(releases):
+            release_member()
 
     return NativeValue(address, is_error=failed, cleanup=release)
 
@@ -175,12 +176,12 @@ def _fill(of: Struct, value: Any, address: Any, c: Any, failures: list[Any], rel
             releases.append(partial(c.builder.call, _once(c, member, "release", _release), [inner]))
 
 
-def _once(c: Any, member: types.Type, what: str, fill: Any) -> Any:
+def _once(c: Any, member: types.Type, purpose: str, fill: Any) -> Any:
     """A function of the module that treats all members of a type: what each did would be most of the code of a loop."""
     kind = _content(c.context.data_model_manager, member).as_pointer()
     item, flag = c.pyapi.pyobj, cgutils.bool_t
     signature = ir.FunctionType(flag, [item, kind]) if fill is _take else ir.FunctionType(ir.VoidType(), [kind])
-    function = cgutils.get_or_insert_function(c.builder.module, signature, f".{what}.{member}")
+    function = cgutils.get_or_insert_function(c.builder.module, signature, f".{purpose}.{member}")
     if not function.blocks:
         function.linkage = "internal"
         function.attributes.add("noinline")

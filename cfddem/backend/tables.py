@@ -36,11 +36,11 @@ def table(
     """
     from rich.console import Console
 
-    made = grid(rows, headings, right=right, widths=widths, gap=gap)
-    if not made.columns:
+    columns = grid(rows, headings, right=right, widths=widths, gap=gap)
+    if not columns.columns:
         return []
     page = Console(file=io.StringIO(), width=WIDTH - indent, color_system=None, legacy_windows=False, record=False)
-    page.print(made)
+    page.print(columns)
     return [f"{' ' * indent}{line}".rstrip() for line in page.file.getvalue().splitlines()]  # type: ignore[attr-defined]
 
 
@@ -58,15 +58,15 @@ def grid(
 
     listed = [[Text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows]
     count = max(map(len, [headings, *listed]), default=0)
-    made = Table(
+    columns = Table(
         box=None, padding=(0, gap, 0, 0), pad_edge=False, show_header=bool(headings), header_style="bold",
         highlight=False,
     )  # fmt: skip
     for place in range(count):
-        made.add_column(
+        columns.add_column(
             Text(headings[place]) if headings else "", justify="right" if place in right else "left",
             no_wrap=place in right, overflow="fold", min_width=widths[place] if place < len(widths) else None,
         )  # fmt: skip
     for row in listed:
-        made.add_row(*row)
-    return made
+        columns.add_row(*row)
+    return columns

@@ -137,12 +137,12 @@ class Table:
 
         values  of all rows; the initial value of the field if None
         """
-        known = self.fields.get(field.name)
-        if known is not None and known != field:
+        declared = self.fields.get(field.name)
+        if declared is not None and declared != field:
             raise InputError(
                 f"field {field.name!r}", None, "declared once", "another declaration differs from this one"
             )
-        if known is None:
+        if declared is None:
             if hasattr(type(self), field.name) or field.name in ("fields", "arrays", "rows"):
                 raise InputError("Field.name", field.name, f"a name that {type(self).__name__} does not use itself")
             self.fields[field.name] = field

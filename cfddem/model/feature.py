@@ -124,10 +124,10 @@ class OwnForce(FluidForce):
 
     def act(self, terms: Any) -> None:
         """The force at the present positions and velocities."""
-        given, count = np.asarray(self.function(terms.particles), float), terms.particles.count
-        if given.shape not in ((3,), (count, 3)):
-            raise InputError(f"force {self.name}", given.shape, f"an array of the shape (3,) or ({count}, 3), in N")
-        force = np.broadcast_to(given, (count, 3)).copy()
+        forces, count = np.asarray(self.function(terms.particles), float), terms.particles.count
+        if forces.shape not in ((3,), (count, 3)):
+            raise InputError(f"force {self.name}", forces.shape, f"an array of the shape (3,) or ({count}, 3), in N")
+        force = np.broadcast_to(forces, (count, 3)).copy()
         wrong = ~np.isfinite(force).all(axis=1)  # local: components of a row
         if wrong.any():  # local: every rank has its own particles
             n = int(np.argmax(wrong))  # local: the first on this rank
