@@ -56,8 +56,8 @@ def size_distribution(belongs: Numbers) -> tuple[Numbers, Numbers]:
     >>> [each.tolist() for each in size_distribution(np.array([0, 0, 7, 0, 9]))]
     [[1, 3], [2, 1]]
     """
-    _, found = np.unique(belongs, return_counts=True)
-    return np.unique(found, return_counts=True)
+    _, members = np.unique(belongs, return_counts=True)
+    return np.unique(members, return_counts=True)
 
 
 def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
@@ -68,11 +68,11 @@ def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
     """
     if count == 0:
         return AgglomerateSizes(float("nan"), 0, float("nan"))
-    found = sizes(agglomerates(first, second, count)).astype(float)
-    alone = float(np.count_nonzero(found == 1.0))  # local: likewise
+    members = sizes(agglomerates(first, second, count)).astype(float)
+    alone = float(np.count_nonzero(members == 1.0))  # local: likewise
     return AgglomerateSizes(
-        mean_by_particle=float((found * found).sum()) / count,  # local: likewise
-        largest=int(found.max()),  # local: likewise
+        mean_by_particle=float((members * members).sum()) / count,  # local: likewise
+        largest=int(members.max()),  # local: likewise
         joined=1.0 - alone / count,
     )
 

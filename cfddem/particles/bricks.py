@@ -34,7 +34,7 @@ class Bricks:
     planes: tuple[Any, Any, Any]
 
     def __post_init__(self) -> None:
-        x, y, z = (np.asarray(each, float) for each in self.planes)
+        x, y, z = (np.asarray(cuts, float) for cuts in self.planes)
         y = np.broadcast_to(y, (len(x) + 1, y.shape[-1]))
         z = np.broadcast_to(z, (len(x) + 1, y.shape[-1] + 1, z.shape[-1]))
         object.__setattr__(self, "planes", (x, y, z))
@@ -42,7 +42,7 @@ class Bricks:
     @classmethod
     def slabs(cls, axis: int, planes: Sequence[float]) -> Bricks:
         """Bricks of one rank along two axes, divided by planes across the third."""
-        x, y, z = (planes if axis == each else () for each in range(3))
+        x, y, z = (planes if axis == other else () for other in range(3))
         return cls((x, y, z))
 
     @classmethod
@@ -72,8 +72,8 @@ class Bricks:
         reach     within which a rank needs ghosts [m]
         """
         places = position[:: max(len(position) // ENOUGH, 1)]
-        made = [cls.balanced(shape, places) for shape in shapes(ranks, (ranks, ranks, ranks))]
-        best = min(made, key=lambda each: round(each.work(places, reach), 2))
+        divisions = [cls.balanced(shape, places) for shape in shapes(ranks, (ranks, ranks, ranks))]
+        best = min(divisions, key=lambda bricks: round(bricks.work(places, reach), 2))
         return cls.balanced(best.shape, position)
 
     def work(self, position: np.ndarray, reach: float) -> float:
@@ -94,7 +94,7 @@ class Bricks:
     @property
     def shape(self) -> Shape:
         """Ranks along x, y, z."""
-        x, y, z = (each.shape[-1] + 1 for each in self.planes)
+        x, y, z = (cuts.shape[-1] + 1 for cuts in self.planes)
         return x, y, z
 
     @cached_property
@@ -103,8 +103,8 @@ class Bricks:
         ends = np.empty((2, *self.shape, 3))
         for axis, planes in enumerate(self.planes):
             outside = np.full((*planes.shape[:-1], 1), FAR)
-            for n, each in enumerate(([-outside, planes], [planes, outside])):
-                ends[n, ..., axis] = np.concatenate(each, axis=-1).reshape(*self.shape[: axis + 1], *[1] * (2 - axis))
+            for n, border in enumerate(([-outside, planes], [planes, outside])):
+                ends[n, ..., axis] = np.concatenate(border, axis=-1).reshape(*self.shape[: axis + 1], *[1] * (2 - axis))
         return ends.reshape(2, -1, 3)
 
     def owner(self, position: np.ndarray) -> np.ndarray:
@@ -127,8 +127,8 @@ class Bricks:
             from_there = _gap(np.stack([low, high]), low[rank], high[rank], length)  # what the other rank finds
             is_near &= np.concatenate([from_here, from_there]).min(axis=0) < reach  # local: borders
         is_near[rank] = False
-        found: list[int] = np.flatnonzero(is_near).tolist()
-        return found
+        ranks: list[int] = np.flatnonzero(is_near).tolist()
+        return ranks
 
     def rows_near(self, ranks: Sequence[int], position: np.ndarray, reach: float, box: np.ndarray) -> list[np.ndarray]:
         """Rows of the positions (N, 3) [m] that are closer than `reach` [m] to the brick of each of some ranks.
@@ -138,15 +138,15 @@ class Bricks:
         box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
         """
         close = dict[tuple[int, float, float], np.ndarray]()
-        ranges, found = [self._ranges(axis, box) for axis in range(3)], []
+        ranges, rows = [self._ranges(axis, box) for axis in range(3)], []
         for rank in ranks:
             here = [(axis, float(low[rank]), float(high[rank])) for axis, (low, high) in enumerate(ranges)]
             for axis, low, high in here:
                 if (axis, low, high) not in close:
                     close[axis, low, high] = _gap(position[:, axis], low, high, box[axis]) < reach
-            x, y, z = (close[each] for each in here)
-            found.append(np.flatnonzero(x & y & z))
-        return found
+            x, y, z = (close[bounds] for bounds in here)
+            rows.append(np.flatnonzero(x & y & z))
+        return rows
 
     def _ranges(self, axis: int, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper ends of the bricks of all ranks along an axis, within a periodic box [m]."""
@@ -169,9 +169,9 @@ def _below(cuts: np.ndarray, part: np.ndarray, place: np.ndarray) -> np.ndarray:
     if cuts.shape[1]:
         order = np.argsort(part, kind="stable")
         begins = np.searchsorted(part[order], np.arange(len(cuts) + 1))
-        for each in np.unique(part).tolist():
-            rows = order[begins[each] : begins[each + 1]]
-            count[rows] = np.searchsorted(cuts[each], place[rows], side="right")
+        for piece in np.unique(part).tolist():
+            rows = order[begins[piece] : begins[piece + 1]]
+            count[rows] = np.searchsorted(cuts[piece], place[rows], side="right")
     return count
 
 
@@ -198,11 +198,11 @@ def _cuts(
     np.add.at(counts, (part, bins), work)
     below = np.cumsum(communicator.sum(counts, axis=()), axis=1)  # local: summed
     cuts = np.empty((parts, ranks - 1))
-    for each, reached in enumerate(below):
+    for piece, reached in enumerate(below):
         wanted = reached[-1] * np.arange(1, ranks) / ranks
         above = np.minimum(np.searchsorted(reached, wanted), BINS - 2)
         under = np.maximum(above - 1, 0)
-        cuts[each] = borders[each, np.where(wanted - reached[under] < reached[above] - wanted, under, above) + 1]
+        cuts[piece] = borders[piece, np.where(wanted - reached[under] < reached[above] - wanted, under, above) + 1]
     return cuts
 
 

@@ -101,18 +101,18 @@ def record_event(k, system, time, rows, count):
     separation, distance, gap = geometry(k, system)
     reduced_radius, inverse_mass = pair_mass_and_radius(k, system)
     reach = system.parameters.cutoff_ratio * reduced_radius if FILM else 0.0
-    known = not np.isnan(memory.begin[k])
-    if known and gap < memory.closest_gap[k]:
+    recorded = not np.isnan(memory.begin[k])
+    if recorded and gap < memory.closest_gap[k]:
         memory.closest_gap[k] = gap
     inside = gap <= reach
     if BRIDGE and memory.bridge_film[k] > 0.0:
         inside = memory.wet[k] = True
-    if known == inside or portion(edges, k) == 0.0:
+    if recorded == inside or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
     velocity = relative_velocity(k, system)
     normal_speed, tangential = dot(velocity, normal), across(velocity, normal)
-    if not known:
+    if not recorded:
         memory.begin[k], memory.begin_speed[k], memory.closest_gap[k] = time, normal_speed, gap
         put(memory.begin_slip, k, tangential)
         put(memory.lost, k, NOT_COUNTED)

@@ -70,9 +70,9 @@ class _Counter:
 
     def make_room(self, engine: Engine, contacts: Count) -> None:
         """Begin with another neighbour list; `contacts` keeps what impulses act on."""
-        held, pulled = np.zeros((2, len(engine.edges.first)))
+        stored, pulled = np.zeros((2, len(engine.edges.first)))
         totals = np.zeros((2, CHUNKS, len(self.account.channels) + 1))
-        self._tally = Tally(contacts.ahead, contacts.spin_ahead, held, pulled, totals)
+        self._tally = Tally(contacts.ahead, contacts.spin_ahead, stored, pulled, totals)
 
     def count(self, engine: Engine, step: float, before: float, after: float) -> np.ndarray:
         """Energy of each channel, and what moving walls have put in [J]; step and half kicks as in `EnergyAccount`."""
@@ -87,8 +87,8 @@ class _Counter:
 
     def stored(self, engine: Engine) -> dict[str, float]:
         """Energy that all edges store, by its form [J]."""
-        held = self._tally.held[engine.edges.first < engine.particles.owned]
-        return {self.account.form: float(engine.communicator.sum(held))} if self.account.form else {}
+        stored = self._tally.held[engine.edges.first < engine.particles.owned]
+        return {self.account.form: float(engine.communicator.sum(stored))} if self.account.form else {}
 
 
 def _flat_but_totals(count: Any) -> Any:
@@ -119,8 +119,8 @@ class Energies(ParticleFeature):
         choices = engine.choices
         bridges = DRYING_BRIDGES if choices["DRYING"] else BRIDGES
         present = {bridges: choices["BRIDGE"], BONDS: choices["BOND"], SHEARED_FILMS: laws.shears}
-        self._counters = [_Counter(each, engine) for each, counted in present.items() if counted]
-        self.channels = (*CHANNELS, *(name for each in self._counters for name in each.account.channels))
+        self._counters = [_Counter(account, engine) for account, counted in present.items() if counted]
+        self.channels = (*CHANNELS, *(name for counter in self._counters for name in counter.account.channels))
         self.totals = np.zeros(len(self.channels))
         self.fed, self._had = 0.0, 0.0  # energy of inserted particles less that of removed ones; before an exchange [J]
         for field in (DISPLACEMENT, WORK_DISPLACEMENT):

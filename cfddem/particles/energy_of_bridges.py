@@ -95,7 +95,7 @@ def _count_bridge(k, system, tally, step, before, after, totals):
         note_bridge_loss(k, memory, lost)
     if change < 0:
         totals[BROKEN] += tally.held[k] - tally.pulled[k]
-    held, pulled = tally.held[k], tally.pulled[k]
+    stored, pulled = tally.held[k], tally.pulled[k]
     tally.held[k] = 0.0
     tally.pulled[k] = 0.0
     if not (BRIDGE_PULL or BRIDGE_APART) or not bridged:
@@ -108,8 +108,8 @@ def _count_bridge(k, system, tally, step, before, after, totals):
     totals[-1] += by_wall
     if change > 0:
         totals[FORMED] += tally.held[k] + work
-    elif step > 0.0 and (BRIDGE_APART or held != 0.0) and memory.bridge_resistance[k] > 0.0:
-        surplus = pulled + work + tally.held[k] - held
+    elif step > 0.0 and (BRIDGE_APART or stored != 0.0) and memory.bridge_resistance[k] > 0.0:
+        surplus = pulled + work + tally.held[k] - stored
         totals[RESISTANCE] -= surplus
         note_bridge_loss(k, memory, -surplus)
     tally.pulled[k], by_wall = _pulled(k, system, after, 1.0)

@@ -75,11 +75,11 @@ def allocate_tally(engine: Engine) -> Count:
     """A count with all values 0, for the present particles and pairs."""
     number, count = len(engine.edges.first), engine.particles.count
     ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
-    spring, stiffness, power, held, yielded = np.zeros((5, number))
+    spring, stiffness, power, spring_energy, yielded = np.zeros((5, number))
     push, twist = np.zeros((2, number, 3))
     totals = np.zeros((2, CHUNKS, len(CHANNELS) + 2))
     return Count(
-        ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, push, twist, totals
+        ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, spring_energy, yielded, push, twist, totals
     )
 
 

@@ -142,10 +142,10 @@ class DividedDomain(SingleDomain):
             old_row = old_row[stay]
         far = self._near is None or not parcels.keys() <= set(self._near)
         beside = None if self.communicator.any(far) else self._near  # all write to all where a particle goes far
-        given = self.communicator.exchange(parcels, beside).values()
-        arrived = [unpacked(parcel, particles.arrays, remembered(old_row[:0])) for parcel in given]
+        received = self.communicator.exchange(parcels, beside).values()
+        arrived = [unpacked(parcel, particles.arrays, remembered(old_row[:0])) for parcel in received]
         if arrived:
-            comers = joined_rows([each for each, _ in arrived])
+            comers = joined_rows([rows for rows, _ in arrived])
             old_row = np.append(old_row, self._known(comers["id"]))
             particles.append(particles.rows_from(comers))
         self._arrived = [pairs for _, pairs in arrived if pairs]
@@ -154,8 +154,8 @@ class DividedDomain(SingleDomain):
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
         """See `SingleDomain.renew`."""
         self._near = self.division.near(self.communicator.rank, reach, box)
-        found = self.division.rows_near(self._near, particles.position, reach, box)
-        self._sent, self._received = {other: rows for other, rows in zip(self._near, found) if len(rows)}, {}
+        rows_of_ranks = self.division.rows_near(self._near, particles.position, reach, box)
+        self._sent, self._received = {other: rows for other, rows in zip(self._near, rows_of_ranks) if len(rows)}, {}
         parcels = {other: packed(particles.copy(rows).arrays) for other, rows in self._sent.items()}
         copies, end = [], particles.count
         for other, parcel in self.communicator.exchange(parcels, self._near).items():
@@ -233,7 +233,7 @@ def handed_out(particles: Particles, division: Bricks, communicator: Communicato
     division      of space among the ranks
     communicator  between them
     """
-    parts = list(slices(particles.count, sum(math.prod(each.shape[1:]) for each in particles.arrays.values())))
+    parts = list(slices(particles.count, sum(math.prod(array.shape[1:]) for array in particles.arrays.values())))
     mine = particles.copy(slice(0))
     for n in range(communicator.largest([len(parts)])):
         some = particles.copy(parts[n] if n < len(parts) else slice(0))
@@ -258,15 +258,15 @@ def packed(*tables: Mapping[str, np.ndarray]) -> np.ndarray:
 def unpacked(parcel: np.ndarray, *tables: Mapping[str, np.ndarray]) -> list[dict[str, np.ndarray]]:
     """The tables that another rank has `packed`, with the names and types of these, whose rows do not matter."""
     end = 8 * len(tables)
-    found = []
+    parts = []
     for rows, table in zip(parcel[:end].view(np.int64).tolist(), tables):
         arrays = {}
         for name in sorted(table):
-            made = arrays[name] = np.empty((rows, *table[name].shape[1:]), table[name].dtype)
-            begin, end = end, end + made.nbytes
-            made.reshape(-1).view(np.uint8)[:] = parcel[begin:end]
-        found.append(arrays)
-    return found
+            array = arrays[name] = np.empty((rows, *table[name].shape[1:]), table[name].dtype)
+            begin, end = end, end + array.nbytes
+            array.reshape(-1).view(np.uint8)[:] = parcel[begin:end]
+        parts.append(arrays)
+    return parts
 
 
 def joined_rows(tables: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -310,7 +310,7 @@ class StepsWithGhosts:
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
         self.inertia, self.wet_walls = choices["BRIDGE_INERTIA"], choices.get("WALL_LIQUID")
         if self.wet_walls:
-            self.requests, self.share = (specialise(each, choices) for each in (wall_requests, share_wall_liquid))
+            self.requests, self.share = (specialise(loop, choices) for loop in (wall_requests, share_wall_liquid))
         self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(
@@ -373,9 +373,9 @@ class FilmsWithGhosts:
         self.ghosts, self.communicator = ghosts, communicator
         loops = (start_films, begin_solution, finish_solution, new_residual, new_scale)
         more = (new_direction, new_product, along_direction, units_of)
-        made = [specialise(loop, choices, threads) for loop in (*loops, *more)]
-        self.start, self.begin, self.finish, self.new_residual, self.new_scale = made[: len(loops)]
-        self.new_direction, self.new_product, self.along, self.units_of = made[len(loops) :]
+        compiled = [specialise(loop, choices, threads) for loop in (*loops, *more)]
+        self.start, self.begin, self.finish, self.new_residual, self.new_scale = compiled[: len(loops)]
+        self.new_direction, self.new_product, self.along, self.units_of = compiled[len(loops) :]
 
     def __call__(self, system: System, step: float) -> None:
         """Arguments of `film_kick`."""

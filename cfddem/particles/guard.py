@@ -69,9 +69,9 @@ def _failure(
     deepest, overlap = _deepest(gap, edges.first, edges.second, split, particles.radius)
     if overlap > CRUSHED:
         row, other = int(edges.first[deepest]), int(edges.second[deepest])
-        what = f"particle {particles.id[other]}" if deepest < split else f"wall {owner[other]}"
+        obstacle = f"particle {particles.id[other]}" if deepest < split else f"wall {owner[other]}"
         return (
-            f"{_place(particles, row, time, step)} is pressed into {what} by {overlap:.2g} "
+            f"{_place(particles, row, time, step)} is pressed into {obstacle} by {overlap:.2g} "
             f"radii (limit {CRUSHED:g}); take a smaller step or a stiffer contact, or start without overlaps"
         )
     return None

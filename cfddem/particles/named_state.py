@@ -98,18 +98,18 @@ def _listed_again(
     for names, values in (("bodies", state["pairs"]), ("touch_bodies", {"touch": state["touch"]})):
         for part in slices(len(state[names]), 16):
             bodies = np.asarray(state[names][part]).reshape(-1, 2)
-            _give(edges, particles, order, bodies, {name: np.asarray(each[part]) for name, each in values.items()})
+            _give(edges, particles, order, bodies, {name: np.asarray(array[part]) for name, array in values.items()})
     return particles, edges, origin
 
 
 def _own_rows(state: Mapping[str, Any], lists: NeighbourLists) -> dict[str, np.ndarray]:
     """Fields of the particles of this rank, with "origin", of a `named_state()` that is read in portions."""
     fields = {**state["particles"], "origin": state["origin"]}
-    found = []
-    for part in slices(len(state["origin"]), sum(math.prod(each.shape[1:]) for each in fields.values())):
+    portions = []
+    for part in slices(len(state["origin"]), sum(math.prod(array.shape[1:]) for array in fields.values())):
         mine = lists.ghosts.owns(np.asarray(state["origin"][part]))
-        found.append({name: np.asarray(values[part])[mine] for name, values in fields.items()})
-    return joined_rows(found)
+        portions.append({name: np.asarray(values[part])[mine] for name, values in fields.items()})
+    return joined_rows(portions)
 
 
 def _give(
@@ -117,13 +117,13 @@ def _give(
 ) -> None:
     """Give the pairs of this rank their values, by the names of their bodies; `order` sorts the particles by id."""
     rows = rows_of(bodies.reshape(-1), particles.id, order).reshape(-1, 2)
-    found = edges.between(rows, bodies)
+    places = edges.between(rows, bodies)
     owned = ((rows >= 0) & (rows < particles.owned)).any(axis=1)  # local: two bodies
-    if (owned & (found < 0)).any():  # local: each rank checks its own pairs
+    if (owned & (places < 0)).any():  # local: each rank checks its own pairs
         raise InputError("checkpoint", None, "one of this case", "its pairs are not those of these particles and walls")
-    known = np.flatnonzero(found >= 0)
-    for name, each in values.items():
+    listed = np.flatnonzero(places >= 0)
+    for name, array in values.items():
         if name == "touch":
-            edges.touch[found[known] - edges.between_particles] = each[known]
+            edges.touch[places[listed] - edges.between_particles] = array[listed]
         else:
-            edges[name][found[known]] = each[known]
+            edges[name][places[listed]] = array[listed]

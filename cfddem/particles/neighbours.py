@@ -99,7 +99,7 @@ def near_first(
     returns    first, second and image in the new order, and the number of pairs that may touch
     """
     pairs = first, second, image
-    place, sorted_pairs = np.empty(len(first), np.int64), tuple(np.empty_like(each) for each in pairs)
+    place, sorted_pairs = np.empty(len(first), np.int64), tuple(np.empty_like(array) for array in pairs)
     graph = Graph(*pairs, len(first), len(first), *(np.zeros(0, kind) for kind in (float, np.int64, np.int32)))
     near = _find_near(particles.view, graph, shifts(box).reshape(-1), allowance, place)
     for old, new in zip(pairs, sorted_pairs):
@@ -159,14 +159,14 @@ def _among_many(particles: Particles, cutoff_ratio: float, skin: float, box: np.
     """
     cells = bin_particles(particles.position, particles.radius, cutoff_ratio, skin, box)
     room = USUAL_PAIRS * (particles.count // CHUNKS + 1)
-    found = np.zeros(CHUNKS, np.int64)
+    counts = np.zeros(CHUNKS, np.int64)
     while True:
         first, second, image = (np.empty(CHUNKS * room, kind) for kind in (np.uint32, np.uint32, np.uint8))
-        _search(particles.view, cells, cutoff_ratio, skin, box, found, FoundPairs(first, second, image))
-        needed = int(found.max())  # local: pairs found by this rank
+        _search(particles.view, cells, cutoff_ratio, skin, box, counts, FoundPairs(first, second, image))
+        needed = int(counts.max())  # local: pairs found by this rank
         if needed <= room:
             begins = room * np.arange(CHUNKS)
-            return [(first[a:b], second[a:b], image[a:b]) for a, b in zip(begins, begins + found)]
+            return [(first[a:b], second[a:b], image[a:b]) for a, b in zip(begins, begins + counts)]
         room = needed
 
 
@@ -184,7 +184,8 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
         kinds, size_class = np.unique(size_class, return_inverse=True)
         largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])  # local: cells
     periodic = np.isfinite(box)
-    bottom, top = (np.array([each(axis) for axis in position.T]) for each in (np.min, np.max))  # local: of this rank
+    extremes = (np.min, np.max)
+    bottom, top = (np.array([extreme(axis) for axis in position.T]) for extreme in extremes)  # local: of this rank
     low = np.where(periodic, 0.0, bottom)
     span = np.where(periodic, box, np.maximum(top - low, smallest))
     wanted = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
@@ -221,7 +222,7 @@ def _sort_into_cells(position, size_class, low, width, number, offset, start, me
 
 
 @threaded
-def _search(particles, cells, cutoff_ratio, skin, box, found, pairs):
+def _search(particles, cells, cutoff_ratio, skin, box, counts, pairs):
     """Write the neighbours of each owned particle in later rows, ascending; count all, store what fits."""
     count, room = particles.owned, len(pairs.first) // CHUNKS
     for chunk in prange(CHUNKS):
@@ -264,7 +265,7 @@ def _search(particles, cells, cutoff_ratio, skin, box, found, pairs):
                                         code = HOME - 9 * shift_x - 3 * shift_y - shift_z
                                         _insert(pairs, begin, total - begin, i, j, code)
                                     total += 1
-        found[chunk] = total - base
+        counts[chunk] = total - base
 
 
 @inline
@@ -290,14 +291,14 @@ def _wrap(cell, number):
 
 
 @inline
-def _insert(pairs, base, found, i, j, code):
+def _insert(pairs, base, number, i, j, code):
     """Keep the neighbours of i in ascending order."""
-    second, image, place = pairs.second, pairs.image, base + found
+    second, image, place = pairs.second, pairs.image, base + number
     while place > base and second[place - 1] > j:
         second[place], image[place] = second[place - 1], image[place - 1]
         place -= 1
     second[place], image[place] = j, code
-    pairs.first[base + found] = i
+    pairs.first[base + number] = i
 
 
 def wrap(position: np.ndarray, box: np.ndarray) -> None:

@@ -79,7 +79,7 @@ class Edges(Table):
 
     def checkpoint(self) -> dict[str, Any]:
         """Copies of the graph and of everything that pairs remember."""
-        graph = {name: np.copy(each) if np.ndim(each) else each for name, each in self.graph._asdict().items()}
+        graph = {name: np.copy(array) if np.ndim(array) else array for name, array in self.graph._asdict().items()}
         return graph | super().checkpoint()
 
     def restored(self, kept: Mapping[str, Any]) -> Edges:
@@ -87,9 +87,9 @@ class Edges(Table):
         values: dict[str, Any] = {
             name: int(kept[name]) if np.ndim(kept[name]) == 0 else np.array(kept[name]) for name in Graph._fields
         }
-        made = Edges(Graph(**values), self.fields.values())
-        made.restore({name: each for name, each in kept.items() if name not in Graph._fields})
-        return made
+        edges = Edges(Graph(**values), self.fields.values())
+        edges.restore({name: array for name, array in kept.items() if name not in Graph._fields})
+        return edges
 
     def carry_over(self, old: Edges, old_row: np.ndarray) -> None:
         """Take over what each pair remembers from an earlier list.
@@ -132,11 +132,11 @@ class Edges(Table):
 
         rows  of their bodies in this list; -1 for particles that are not in it, and for walls (n, 2)
         """
-        found = self.between(rows, pairs["bodies"])
-        known = np.flatnonzero(found >= 0)
+        places = self.between(rows, pairs["bodies"])
+        listed = np.flatnonzero(places >= 0)
         for name, array in self.lasting().items():
             if name in pairs:  # an earlier run may remember less
-                array[found[known]] = pairs[name][known]
+                array[places[listed]] = pairs[name][listed]
 
     def between(self, rows: np.ndarray, bodies: np.ndarray) -> np.ndarray:
         """Edges of pairs; -1 where there is none (n,).
@@ -144,9 +144,9 @@ class Edges(Table):
         rows    of their bodies; -1 for particles that are not in this list, and for walls (n, 2)
         bodies  names of their bodies, see `ends` (n, 2)
         """
-        found = np.empty(len(bodies), np.int64)
-        _find_named(self.flat_graph, rows, bodies, found)
-        return found
+        places = np.empty(len(bodies), np.int64)
+        _find_named(self.flat_graph, rows, bodies, places)
+        return places
 
 
 HOME = 13
@@ -256,12 +256,12 @@ def _find(old, new, old_row, source):
 
 
 @serial
-def _find_named(edges, rows, bodies, found):
+def _find_named(edges, rows, bodies, places):
     """Find the edges of pairs by the rows of their particles and the names of their walls; -1 where there is none."""
-    for n in range(len(found)):
+    for n in range(len(places)):
         wall, i = bodies[n, 1] < 0, rows[n, 0]
         j = -1 - bodies[n, 1] if wall else rows[n, 1]
-        found[n] = _edge_of(edges, i, j, wall)
+        places[n] = _edge_of(edges, i, j, wall)
 
 
 def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> np.ndarray:

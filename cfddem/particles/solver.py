@@ -137,12 +137,12 @@ class ParticleSolver:
 
     def find(self, kind: type[Kind]) -> Kind | None:
         """The feature of a kind; None if this run has none."""
-        return next((each for each in self.features if isinstance(each, kind)), None)
+        return next((feature for feature in self.features if isinstance(feature, kind)), None)
 
     def feature(self, kind: type[Kind]) -> Kind:
         """The feature of a kind, such as `Bridges`; InputError if this run has none."""
-        if found := self.find(kind):
-            return found
+        if feature := self.find(kind):
+            return feature
         raise InputError(kind.name, None, "a particle solver that has them", "see the options of ParticleSolver")
 
     @property
@@ -163,7 +163,7 @@ class ParticleSolver:
     def _find_reach(self, after: Particles | None = None) -> float:
         """Reach that the next list must have; `after` a change to these particles."""
         reach = self.laws.cutoff_ratio if self.laws.film else 0.0
-        return max(reach, *(each.reach_ratio(self, after) for each in self.features), 0.0)
+        return max(reach, *(feature.reach_ratio(self, after) for feature in self.features), 0.0)
 
     @property
     def gravity(self) -> tuple[float, float, float]:
@@ -236,23 +236,23 @@ class ParticleSolver:
         if self.held:
             self.steps, self.time = self.steps + steps, self.time + steps * step
             return
-        if any(each.outgrows(self, self._reach) for each in self.features):  # local: the same on all ranks
+        if any(feature.outgrows(self, self._reach) for feature in self.features):  # local: the same on all ranks
             self._relist()
-        first, at_once = True, 1 if any(each.every_step for each in self.features) else steps  # local: a choice
+        first, at_once = True, 1 if any(feature.every_step for feature in self.features) else steps  # local: a choice
         while steps > 0:
             if self._checking and step > self._accepted:
                 check_step(step, refusing(self.time_scales(), self.laws.film))
                 self._accepted = step
-            for each in self.features:
-                each.before(self, step, first)
+            for feature in self.features:
+                feature.before(self, step, first)
             done, farthest, noted = self._integrate(step, min(steps, at_once))
             self.last_step = step
             self.timers.lap("pairs and motion")
             steps -= done
-            for each in self.features:
-                each.after(self, step, steps == 0, noted)
-                if each.every_step:
-                    self.timers.lap(each.name)
+            for feature in self.features:
+                feature.after(self, step, steps == 0, noted)
+                if feature.every_step:
+                    self.timers.lap(feature.name)
             first = False
             self.steps += done
             self.time += done * step
@@ -284,7 +284,7 @@ class ParticleSolver:
         return state | {
             "walls": checkpoint_walls(self.walls),
             "listed_walls": self._listed_walls,
-            "features": {each.name: each.checkpoint() for each in self.features},
+            "features": {feature.name: feature.checkpoint() for feature in self.features},
             "lists": self.lists.checkpoint(),
             "counters": {
                 "time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside,
@@ -302,8 +302,8 @@ class ParticleSolver:
         self.lists.restore(state["lists"])
         counters = state["counters"]
         self._reach = float(counters["reach"])
-        found = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach)
-        self.particles, edges, origin = found
+        restored = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach)
+        self.particles, edges, origin = restored
         self.lists.count(self.particles)
         self.time, self.steps = float(counters["time"]), int(counters["steps"])
         self._next_id = max(self._next_id, self.communicator.largest(self.particles.id, default=-1) + 1)
@@ -314,8 +314,8 @@ class ParticleSolver:
         self._take_list(edges)
         self._origin[:], self._listed_walls = origin, listed_walls
         self.walls.travel[:], self.edges.touch[:] = walls["travel"], touch
-        for each in self.features:
-            each.restore(state["features"][each.name])
+        for feature in self.features:
+            feature.restore(state["features"][feature.name])
 
     def _integrate(self, step: float, steps: int) -> tuple[int, float, int]:
         threads = self.lists.many and use_threads(None) > 1  # one thread gains nothing from loops for all
@@ -331,8 +331,8 @@ class ParticleSolver:
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""
         self.edges, self._owned = edges, self.particles.owned
-        for each in self.features:
-            self.walls = each.with_room(self.walls, edges)
+        for feature in self.features:
+            self.walls = feature.with_room(self.walls, edges)
         self._origin: np.ndarray = self.particles.position.copy()
         self._listed_walls = checkpoint_walls(self.walls)
         self.system = System(
@@ -369,8 +369,8 @@ class ParticleSolver:
         fresh.id[:] = ids
         joined = self.particles.copy(slice(count))
         added = joined.append(self.lists.own(fresh))
-        for each in self.features:
-            each.inserted(self, joined, added)
+        for feature in self.features:
+            feature.inserted(self, joined, added)
         self._exchange(joined, np.append(np.arange(count), np.full(len(added), -1)))
         return ids
 
@@ -384,28 +384,28 @@ class ParticleSolver:
         number = self.communicator.count(gone)
         if self.communicator.all(gone):
             raise InputError("gone", number, f"fewer than all {number} particles")
-        for each in self.features:
-            each.removing(self, gone)
+        for feature in self.features:
+            feature.removing(self, gone)
         taken: Particles = self.particles.copy(np.flatnonzero(gone))
         if number:
             stay = np.flatnonzero(~gone)
             self._exchange(self.particles.copy(stay), stay)
         return taken
 
-    def _exchange(self, made: Particles, old_row: np.ndarray) -> None:
+    def _exchange(self, particles: Particles, old_row: np.ndarray) -> None:
         """Continue with other particles; the memory of a pair is kept if both its particles remain.
 
         old_row  row of each before; -1 for an inserted particle
         """
-        for each in self.features:
-            each.before_exchange(self)
-        self._reach = self._find_reach(made)
-        self.particles = made
-        self.lists.count(made)
+        for feature in self.features:
+            feature.before_exchange(self)
+        self._reach = self._find_reach(particles)
+        self.particles = particles
+        self.lists.count(particles)
         self._renew(old_row.astype(np.int32))
         self._accepted, self.lists.listed_at = 0.0, self.steps
         springs = self.edges.spring.copy()
         self.refresh()
         self.edges.spring[:] = springs  # no time has passed in which contacts could slide
-        for each in self.features:
-            each.after_exchange(self)
+        for feature in self.features:
+            feature.after_exchange(self)

@@ -104,8 +104,8 @@ class Particles(Table):
     def view_with(self, fields: Iterable[Field]) -> Any:
         """The arrays of `PARTICLE_FIELDS` and of more declared fields, as loops take them, and the number `owned`."""
         names = (*(field.name for field in PARTICLE_FIELDS), *(field.name for field in fields))
-        made = named_arrays("Particles", (*names, "owned"))
-        return made(*(self[name].reshape(-1) for name in names), owned=self.owned)
+        structure = named_arrays("Particles", (*names, "owned"))
+        return structure(*(self[name].reshape(-1) for name in names), owned=self.owned)
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
@@ -136,13 +136,13 @@ def rows_of(ids: np.ndarray, among: np.ndarray, order: np.ndarray) -> np.ndarray
 
     order  rows in the order of their ids (N,)
     """
-    found = np.full(len(ids), -1, np.int32)
+    rows_of_ids = np.full(len(ids), -1, np.int32)
     place = np.searchsorted(among, ids, sorter=order)
     inside = np.flatnonzero(place < len(order))
     rows = order[place[inside]]
     same = among[rows] == ids[inside]
-    found[inside[same]] = rows[same]
-    return found
+    rows_of_ids[inside[same]] = rows[same]
+    return rows_of_ids
 
 
 def make_particles(

@@ -92,13 +92,13 @@ def _film_strength(laws: Laws, viscosity: float, reduced_radius: float, gap: flo
 
 def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float, float, np.ndarray]]:
     """Reduced mass, reduced radius and table row of the smallest pair of each two materials."""
-    found = []
+    pairs = []
     for kind in np.unique(particles.material):
         own = np.flatnonzero(particles.material == kind)
         smallest = own[np.argmin(particles.radius[own])]  # local: of this rank
         for row in table[kind]:
-            found.append((0.5 * float(particles.mass[smallest]), 0.5 * float(particles.radius[smallest]), row))
-    return found
+            pairs.append((0.5 * float(particles.mass[smallest]), 0.5 * float(particles.radius[smallest]), row))
+    return pairs
 
 
 @inline

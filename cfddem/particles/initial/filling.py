@@ -131,16 +131,16 @@ def _sites(
     room = joined == 1 + int(np.argmax(np.bincount(joined.reshape(-1))[1:]))
     sites = [inside[room]]
     open_above, begin = room[:, :, -1], along[2]
-    while (found := sum(len(part) for part in sites)) < wanted and open_above.any():
-        end = begin + max(1, math.ceil((wanted - found) / int(open_above.sum())))
+    while (count := sum(len(part) for part in sites)) < wanted and open_above.any():
+        end = begin + max(1, math.ceil((wanted - count) / int(open_above.sum())))
         above = layers(begin, end)
         clear = clear_of_walls(above.reshape(-1, 3), 0.5 * pitch, walls).reshape(above.shape[:3])
         room = np.logical_and.accumulate(clear & open_above[:, :, None], axis=2)
         sites.append(above[room])
         open_above, begin = room[:, :, -1], end
-    if found < wanted:
+    if count < wanted:
         raise InputError(
-            "size", tuple(size), f"a box with {wanted} places for the largest sphere, not {found}, below the walls' top"
+            "size", tuple(size), f"a box with {wanted} places for the largest sphere, not {count}, below the walls' top"
         )
     every = np.concatenate(sites)
     return every[np.argsort(every[:, 2], kind="stable")[:wanted]]

@@ -173,8 +173,8 @@ class _Pouring:
 
     def _potential(self) -> float:
         """Energy of the weight above z = 0 [J]."""
-        made = self.run.particles
-        return float(np.sum(made.mass * self.gravity * made.position[:, 2]))
+        particles = self.run.particles
+        return float(np.sum(particles.mass * self.gravity * particles.position[:, 2]))
 
     def report_progress(self) -> None:
         if self.progress is not None:
@@ -191,18 +191,19 @@ class _Pouring:
 
     def calm(self) -> None:
         """Stop particles that move against their force, repeatedly, until the bed is at rest."""
-        made = self.run.particles
+        particles = self.run.particles
         while True:
             step = 0.7 * self.run.time_scales(self.slow).limit
             for steps in 6 * _STEPS_BETWEEN_STOPS:
                 self.go(step, steps)
-                power = (made.velocity * made.force + made.spin * made.torque).sum(axis=1)
+                power = (particles.velocity * particles.force + particles.spin * particles.torque).sum(axis=1)
                 back = power < 0.0
                 if self.time > ROLLING * self.fall_time:
-                    speed = np.linalg.norm(made.velocity, axis=1) + made.radius * np.linalg.norm(made.spin, axis=1)
-                    back |= power < _ROLLS * self.gravity * made.mass * speed
-                made.velocity[back] = 0.0
-                made.spin[back] = 0.0
+                    turning = particles.radius * np.linalg.norm(particles.spin, axis=1)
+                    speed = np.linalg.norm(particles.velocity, axis=1) + turning
+                    back |= power < _ROLLS * self.gravity * particles.mass * speed
+                particles.velocity[back] = 0.0
+                particles.spin[back] = 0.0
             self.report_progress()
             few = _FEW if self.at_rest <= AT_REST else _SOME
             if self.left < _BEFORE_RELEASE * self.at_rest and (unbalanced(self.run) > _UNBALANCED).mean() <= few:
@@ -222,7 +223,7 @@ class _Pouring:
 def _not_at_rest(run: ParticleSolver, left: float, time: float, limit: float) -> str:
     """What to say of a bed that does not come to rest in time, and what a case can change."""
     moving = int(np.argmax((run.particles.velocity**2).sum(axis=1)))
-    place = ", ".join(f"{each:.3g}" for each in run.particles.position[moving])
+    place = ", ".join(f"{coordinate:.3g}" for coordinate in run.particles.position[moving])
     share = (unbalanced(run) > _UNBALANCED).mean()
     return (
         f"the poured bed is not at rest after {time:.3g} s: it holds {left:.2g} of the energy of its fall (limit "
@@ -233,9 +234,9 @@ def _not_at_rest(run: ParticleSolver, left: float, time: float, limit: float) ->
 
 def unbalanced(run: ParticleSolver) -> np.ndarray:
     """Unbalanced force on each particle, or torque over its radius, over its weight (N,) [-]."""
-    made = run.particles
-    force, pull = np.linalg.norm(made.force, axis=1), np.linalg.norm(made.torque, axis=1) / made.radius
-    return np.maximum(force, pull) / (made.mass * float(np.linalg.norm(run.gravity)))
+    particles = run.particles
+    force, pull = np.linalg.norm(particles.force, axis=1), np.linalg.norm(particles.torque, axis=1) / particles.radius
+    return np.maximum(force, pull) / (particles.mass * float(np.linalg.norm(run.gravity)))
 
 
 def deepest(run: ParticleSolver) -> float:
@@ -267,10 +268,12 @@ def _softened(table: np.ndarray, softening: float, damped: bool) -> np.ndarray:
     return soft
 
 
-def _in_order(made: Particles) -> Particles:
+def _in_order(particles: Particles) -> Particles:
     """The same particles in the order of their ids, at rest."""
-    order = np.argsort(made.id)
-    return make_particles(made.position[order], made.radius[order], made.density[order], material=made.material[order])
+    order = np.argsort(particles.id)
+    return make_particles(
+        particles.position[order], particles.radius[order], particles.density[order], material=particles.material[order]
+    )
 
 
 def pour(

@@ -31,19 +31,19 @@ def read_particles(path: str | Path, density: float | None = None, material: int
     read = {".csv": _columns, ".npz": _arrays}.get(path.suffix.lower())
     if read is None:
         raise InputError("particles", str(path), "a .csv or .npz file")
-    found = read(path)
+    columns = read(path)
     for name in ("position", "diameter", *(("density",) if density is None else ())):
-        if name not in found:
-            raise InputError(f"particles in {path.name}", sorted(found), f"a table with {name}")
-    for name, values in found.items():
+        if name not in columns:
+            raise InputError(f"particles in {path.name}", sorted(columns), f"a table with {name}")
+    for name, values in columns.items():
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
             raise InputError(f"{name} in {path.name}, particle {row}", values[row].tolist(), "a number")
     return make_particles(
-        scale * found["position"],
-        0.5 * scale * found["diameter"],
-        found.get("density", density),  # type: ignore[arg-type]
-        material=found.get("material", material),  # type: ignore[arg-type]
+        scale * columns["position"],
+        0.5 * scale * columns["diameter"],
+        columns.get("density", density),  # type: ignore[arg-type]
+        material=columns.get("material", material),  # type: ignore[arg-type]
     )
 
 
@@ -60,10 +60,10 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
         raise InputError(f"particles in {path.name}", None, f"rows of {len(names)} numbers", str(refusal)) from None
     if table.shape[1] != len(names):
         raise InputError(f"particles in {path.name}", table.shape[1], f"{len(names)} numbers in a row")
-    found = dict(zip(names, table.T))
+    columns = dict(zip(names, table.T))
     if {"x", "y", "z"} <= set(names):
-        found["position"] = np.stack([found.pop(axis) for axis in "xyz"], axis=1)
-    return found
+        columns["position"] = np.stack([columns.pop(axis) for axis in "xyz"], axis=1)
+    return columns
 
 
 def _lines_before_numbers(path: Path) -> int:
@@ -75,12 +75,12 @@ def _lines_before_numbers(path: Path) -> int:
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
-    known = ("position", "diameter", "density", "material")
+    names = ("position", "diameter", "density", "material")
     try:
         with np.load(path) as file:
-            found = {name: np.asarray(file[name], float) for name in file.files if name in known}
+            columns = {name: np.asarray(file[name], float) for name in file.files if name in names}
     except (ValueError, OSError, BadZipFile):
         raise InputError("particles", str(path), "a file of numpy arrays") from None
-    if "position" in found and (found["position"].ndim != 2 or found["position"].shape[1] != 3):
-        raise InputError(f"position in {path.name}", found["position"].shape, "a table (N, 3)")
-    return found
+    if "position" in columns and (columns["position"].ndim != 2 or columns["position"].shape[1] != 3):
+        raise InputError(f"position in {path.name}", columns["position"].shape, "a table (N, 3)")
+    return columns

@@ -119,11 +119,11 @@ def release_stiff(system, step):
 @inline
 def released(i, system):
     """Whether a bridge of particle i is marked."""
-    edges, found = system.edges, False
+    edges, any_released = system.edges, False
     for place in places_of(i, edges):
         k, _ = edge_role(edges.incident[place])
-        found = found or system.memory.bridge_apart[k] < 0.0
-    return found
+        any_released = any_released or system.memory.bridge_apart[k] < 0.0
+    return any_released
 
 
 @serial

@@ -275,7 +275,7 @@ class BridgeLaws:
             check_compiles(f"laws.bridge.{name}", function)
 
     collision_memory, collision_fields = WET_FIELDS, WET_COLLISION_FIELDS
-    kept_apart = frozenset(each.name for each in (*FIELDS, *INERTIA_FIELDS, *solid_bond.FIELDS))
+    kept_apart = frozenset(field.name for field in (*FIELDS, *INERTIA_FIELDS, *solid_bond.FIELDS))
 
     @property
     def particle_fields(self) -> tuple[Field, ...]:
@@ -318,8 +318,8 @@ class BridgeLaws:
     def numbers(self) -> BridgeNumbers:
         """The numbers of all laws."""
         on_walls = self.contact_angle if self.wall_contact_angle is None else self.wall_contact_angle
-        given = {name: getattr(self, name) for name in BridgeNumbers._fields} | {"wall_contact_angle": on_walls}
-        return BridgeNumbers(**{name: float(value) for name, value in given.items()})
+        values = {name: getattr(self, name) for name in BridgeNumbers._fields} | {"wall_contact_angle": on_walls}
+        return BridgeNumbers(**{name: float(value) for name, value in values.items()})
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
@@ -327,7 +327,7 @@ class BridgeLaws:
         of_bridge |= {name: f"bridge.functions.{name}" for name in self.parameters}
         of_radii = {name: name for name in ("radius", "other_radius")}
         of_angles = {name: name for name in ("contact_angle", "other_contact_angle")}
-        made: dict[str, Any] = {
+        choices: dict[str, Any] = {
             "BRIDGE": True,
             "DRYING": self.dries,
             "BOND": self.bond is not None,
@@ -336,18 +336,18 @@ class BridgeLaws:
         }
         for slot, function in self._functions().items():
             if slot == "drawn_share":
-                made[slot] = bind_arguments(function, "radius, other_radius", of_radii)
+                choices[slot] = bind_arguments(function, "radius, other_radius", of_radii)
             elif slot == "returned_share":
-                made[slot] = bind_arguments(function, ", ".join(of_radii | of_angles), of_radii | of_angles)
+                choices[slot] = bind_arguments(function, ", ".join(of_radii | of_angles), of_radii | of_angles)
             else:
-                made[slot] = bind_arguments(function, "bridge", of_bridge)
-        return made | {
-            "BRIDGE_FILM": "bridge_resistance" in made,
+                choices[slot] = bind_arguments(function, "bridge", of_bridge)
+        return choices | {
+            "BRIDGE_FILM": "bridge_resistance" in choices,
             "BRIDGE_INERTIA": self.film_density > 0.0,
-            "BRIDGE_SLIDING": "sliding_resistance" in made,
-            "BRIDGE_PULL": "bridge_pull" in made,
-            "BRIDGE_POTENTIAL": "bridge_potential" in made,
-            "BRIDGE_ENERGY": "bridge_energy" in made,
+            "BRIDGE_SLIDING": "sliding_resistance" in choices,
+            "BRIDGE_PULL": "bridge_pull" in choices,
+            "BRIDGE_POTENTIAL": "bridge_potential" in choices,
+            "BRIDGE_ENERGY": "bridge_energy" in choices,
         }
 
     def _functions(self) -> dict[str, Function]:
@@ -407,4 +407,4 @@ class NoBridges:
 
 NO_BRIDGES = NoBridges()
 
-assert {*BridgeNumbers._fields} <= {each.name for each in fields(BridgeLaws)}
+assert {*BridgeNumbers._fields} <= {field.name for field in fields(BridgeLaws)}

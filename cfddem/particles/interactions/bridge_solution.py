@@ -26,7 +26,7 @@ SHORT = 0.05
 STILL = 1e-8
 """Change of the gap in a step, over the gap or h_min, below which the resistance is taken as constant."""
 
-_NODES, _WEIGHTS = (tuple(float(x) for x in each) for each in np.polynomial.legendre.leggauss(5))
+_NODES, _WEIGHTS = (tuple(float(x) for x in numbers) for numbers in np.polynomial.legendre.leggauss(5))
 _ASIDE = math.sqrt(0.6)
 
 

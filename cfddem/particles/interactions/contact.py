@@ -79,7 +79,7 @@ def contact(kinematics, row, minimum_gap, spring, m, p, step):
     d = derive(state, row, p, m)
     m = remember(state, row, p, m, d)
     elastic = elastic_force(state, row, p, m, d)
-    held = pull_off(state, row, p, m, d)
+    adhesion = pull_off(state, row, p, m, d)
     overlap = contact_overlap(state, row, p, m, d)
     state = ContactState(overlap, state.gap, normal_speed, step, minimum_gap, state.reduced_radius, state.reduced_mass)
     damping = normal_damping(state, row, p, m, d)
@@ -111,7 +111,7 @@ def contact(kinematics, row, minimum_gap, spring, m, p, step):
     mid_slip = times(1.0 / (1.0 + ROLLING_MOBILITY * kick * damping), mid_slip)
     pull = plus(times(stiffness, spring), times(damping, mid_slip))
     friction = friction_coefficient(row, minimum_gap)
-    limit = coulomb_limit(friction, normal_force + 2.0 * held)  # adhesion adds to the load, Thornton (1991)
+    limit = coulomb_limit(friction, normal_force + 2.0 * adhesion)  # adhesion adds to the load, Thornton (1991)
     size = math.sqrt(dot(pull, pull))
     sliding = size > limit
     pull = times(limit / max(size, LEAST) if sliding else 1.0, pull)

@@ -113,11 +113,11 @@ class ContactLaw:
             self.force, self.damping, self.stiffness, self.tangential_stiffness, self.secant_stiffness, self.energy,
             self.lost, self.remember, self.overlap, self.pull_off, self.reach, *self.derived.values(),
         )  # fmt: skip
-        return tuple(each for each in every if each is not None)
+        return tuple(function for function in every if function is not None)
 
     def takes(self, name: str) -> bool:
         """Whether a function of the law takes this argument."""
-        return any(name in signature(each).parameters for each in self.functions)
+        return any(name in signature(function).parameters for function in self.functions)
 
     # ---------------------------------------------------------------- outside of loops
 
@@ -128,15 +128,15 @@ class ContactLaw:
         mass, radius  reduced [kg], [m]
         row           entry of the pair table
         """
-        known = self._known(mass, radius, row)
-        known |= {"overlap": overlap, "gap": -overlap, "normal_speed": 0.0, "step": 0.0, "minimum_gap": 0.0}
-        known |= {each.name: float(each.initial) for each in self.memory}  # type: ignore[arg-type]
-        for name, each in self.derived.items():
-            known[name] = _asked(each, known)
+        values = self._known(mass, radius, row)
+        values |= {"overlap": overlap, "gap": -overlap, "normal_speed": 0.0, "step": 0.0, "minimum_gap": 0.0}
+        values |= {field.name: float(field.initial) for field in self.memory}  # type: ignore[arg-type]
+        for name, derived in self.derived.items():
+            values[name] = _asked(derived, values)
         if self.remember is not None:
-            now = np.atleast_1d(_asked(self.remember, known))
-            known |= {each.name: float(value) for each, value in zip(self.memory, now)}
-        return float(_asked(function, known))
+            now = np.atleast_1d(_asked(self.remember, values))
+            values |= {field.name: float(value) for field, value in zip(self.memory, now)}
+        return float(_asked(function, values))
 
     def impact_steps(self, mass: float, radius: float, row: Any, speed: float) -> tuple[float, float]:
         """Default step and stability limit of an impact at a speed [s]; infinite without a speed."""
@@ -146,7 +146,8 @@ class ContactLaw:
             return math.inf, math.inf
         overlap = min(self.largest_overlap(mass, radius, row, speed), radius)
         stiffest = max(
-            self.evaluate(each, overlap, mass, radius, row) for each in (self.stiffness, self.tangential_stiffness)
+            self.evaluate(stiffness, overlap, mass, radius, row)
+            for stiffness in (self.stiffness, self.tangential_stiffness)
         )
         return stiffness_steps(mass, stiffest)
 
@@ -170,12 +171,12 @@ class ContactLaw:
         return {**columns, "reduced_mass": mass, "reduced_radius": radius, **self.parameters}
 
 
-def _asked(function: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+def _asked(function: Callable[..., Any], values: Mapping[str, Any]) -> Any:
     """Value of a function that takes some of the known values by name."""
     taken = _arguments(function)
-    if unknown := [name for name in taken if name not in known]:
-        raise InputError(f"argument of {function.__name__}", unknown[0], f"one of {', '.join(known)}")
-    return function(**{name: known[name] for name in taken})
+    if unknown := [name for name in taken if name not in values]:
+        raise InputError(f"argument of {function.__name__}", unknown[0], f"one of {', '.join(values)}")
+    return function(**{name: values[name] for name in taken})
 
 
 @cache

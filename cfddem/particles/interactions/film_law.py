@@ -37,7 +37,7 @@ LARGEST_SAMPLED_CHANGE = 0.05
 SLIDING_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "asymmetry")
 """Arguments that a user's resistance to sliding may take, by name."""
 
-_NODES, _WEIGHTS = (tuple(float(x) for x in each) for each in np.polynomial.legendre.leggauss(5))
+_NODES, _WEIGHTS = (tuple(float(x) for x in numbers) for numbers in np.polynomial.legendre.leggauss(5))
 _ASIDE = math.sqrt(0.6)
 
 
@@ -61,9 +61,9 @@ class FilmLaw:
 
     def check(self) -> None:
         """Refuse functions that cannot be compiled."""
-        for each in (self.resistance, self.potential, self.short_potential, self.sliding):
-            if each is not None:
-                check_compiles("laws.lubrication", each)
+        for function in (self.resistance, self.potential, self.short_potential, self.sliding):
+            if function is not None:
+                check_compiles("laws.lubrication", function)
 
     def choices(self) -> dict[str, Any]:
         """What goes into the slots of the loops."""
@@ -212,8 +212,8 @@ def speed_after_short_step(speed, film, integrated_gap, step, strength_per_mass,
     )  # fmt: skip
     # the last correction bounds what the next one would be
     curvature = inverse_mass * resistance * (1.0 / low if inside else lever)
-    found = curvature * (step * last) ** 2 <= 1e-14 * (abs(total) + abs(guess))
-    return guess if shortly and found else math.nan
+    converged = curvature * (step * last) ** 2 <= 1e-14 * (abs(total) + abs(guess))
+    return guess if shortly and converged else math.nan
 
 
 @inline

@@ -311,14 +311,14 @@ def film_residual(e, system, step, renew):
     particles, memory = system.particles, system.memory
     _, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
     before = memory.joint_before[e]
-    given, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
+    change, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
     if renew:
-        memory.joint_speed[e], memory.joint_shift[e] = before + given, 0.0
-        resistance = mean_resistance(before, before + given, e, system, step)
+        memory.joint_speed[e], memory.joint_shift[e] = before + change, 0.0
+        resistance = mean_resistance(before, before + change, e, system, step)
         memory.joint_compliance[e] = 1.0 / (step * max(resistance, memory.joint_least[e]))
     compliance, impulse = memory.joint_compliance[e], memory.joint_impulse[e]
     wanted = compliance * memory.joint_debt[e] - before
-    residual = wanted - given - compliance * impulse
+    residual = wanted - change - compliance * impulse
     inverse = 1.0 / (compliance + memory.joint_weight[e])
     memory.joint_residual[e], memory.joint_direction[e] = residual, inverse * residual
     left, whole = inverse * residual * residual, inverse * wanted * wanted
@@ -336,10 +336,10 @@ def film_residual(e, system, step, renew):
         whole += dot(a, slip) + dot(b, roll)
         by_wanted -= dot(push, slip) + dot(couple, roll)
         by_residual += dot(push, s) + dot(couple, q)
-    made = (left, whole, by_wanted, by_residual) if own(e, system) else (0.0, 0.0, 0.0, 0.0)
+    sums = (left, whole, by_wanted, by_residual) if own(e, system) else (0.0, 0.0, 0.0, 0.0)
     terms, rows = memory.joint_terms, len(system.edges.first)
-    terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = made
-    return made
+    terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = sums
+    return sums
 
 
 @inline
@@ -369,9 +369,9 @@ def find_residual(system, count, step, renew):
     for chunk in prange(CHUNKS):
         left, whole, by_wanted, by_residual = 0.0, 0.0, 0.0, 0.0
         for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            made = film_residual(e, system, step, renew)
-            left, whole = greater(left, made[0]), greater(whole, made[1])
-            by_wanted, by_residual = greater(by_wanted, made[2]), greater(by_residual, made[3])
+            sums = film_residual(e, system, step, renew)
+            left, whole = greater(left, sums[0]), greater(whole, sums[1])
+            by_wanted, by_residual = greater(by_wanted, sums[2]), greater(by_residual, sums[3])
         tops[0, chunk], tops[1, chunk], tops[2, chunk], tops[3, chunk] = left, whole, by_wanted, by_residual
     return greatest(tops[0]), greatest(tops[1]), greatest(tops[2]), greatest(tops[3])
 

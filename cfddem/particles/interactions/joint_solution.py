@@ -334,8 +334,8 @@ def follow_direction(system, count, length, step):
     for chunk in prange(CHUNKS):
         left, outdated = 0.0, 0.0
         for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            made = film_follows(e, system, length, step)
-            left, outdated = greater(left, made[0]), greater(outdated, made[1])
+            sums = film_follows(e, system, length, step)
+            left, outdated = greater(left, sums[0]), greater(outdated, sums[1])
         tops[0, chunk], tops[1, chunk] = left, outdated
     for i in prange(len(particles.radius)):
         change, along = at(particles.film_change, i), at(particles.film_along, i)

@@ -215,7 +215,7 @@ def _three(values: Sequence[float]) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=64)
 def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
-    made = {
+    choices = {
         **contact_choices(contact_law),
         "FILM": bool(laws.film),
         "DRIFTING": laws.drifting,
@@ -239,14 +239,14 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
     }
     if laws.minimum_gap is not None:
         entry = chosen("minimum_gap", laws.minimum_gap)
-        made |= gap_choices(entry.function)
-        made |= {"COUNT_GAP": bool(entry.ranges), "gap_outside": range_check("gap", GapState._fields, entry.ranges)}
+        choices |= gap_choices(entry.function)
+        choices |= {"COUNT_GAP": bool(entry.ranges), "gap_outside": range_check("gap", GapState._fields, entry.ranges)}
     if (film_law := laws.film_law) is not None:
-        made |= film_law.choices()
+        choices |= film_law.choices()
         if not isinstance(laws.lubrication, FilmLaw):
             ranges = chosen("lubrication", laws.lubrication).ranges  # type: ignore[arg-type]
-            made |= {"COUNT_FILM": bool(ranges), "film_outside": range_check("film", FilmState._fields, ranges)}
-    return made
+            choices |= {"COUNT_FILM": bool(ranges), "film_outside": range_check("film", FilmState._fields, ranges)}
+    return choices
 
 
 # ---------------------------------------------------------------- slots of a contact law
@@ -257,10 +257,10 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
 ARGUMENTS = "contact, row, p, m, d"
 
 TAKEN = {
-    each.name
-    for each in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *shear_film.FIELDS, *rolling.FIELDS, *RECORD_FIELDS)
+    field.name
+    for field in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *shear_film.FIELDS, *rolling.FIELDS, *RECORD_FIELDS)
 }
-TAKEN |= {each.name for each in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields)
+TAKEN |= {field.name for field in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields)
 """Names of the built-in fields of pairs."""
 
 
@@ -279,27 +279,29 @@ def contact_choices(law: ContactLaw) -> dict[str, Any]:
         "lost_energy": law.lost or _nothing,
     }
     places = _places(law)
-    made = {slot: bind_arguments(function, ARGUMENTS, places) for slot, function in functions.items()}
+    choices = {slot: bind_arguments(function, ARGUMENTS, places) for slot, function in functions.items()}
     sources = {name: place for name, place in places.items() if name not in law.derived}
-    parts = {f"law_{n}": bind_arguments(each, ARGUMENTS[:-3], sources) for n, each in enumerate(law.derived.values())}
+    parts = {
+        f"law_{n}": bind_arguments(function, ARGUMENTS[:-3], sources) for n, function in enumerate(law.derived.values())
+    }
     calls = "".join(f"{name}({ARGUMENTS[:-3]}), " for name in parts)
-    made["derive"] = compile_source(f"def derive({ARGUMENTS[:-3]}):\n    return ({calls})\n", **parts)
+    choices["derive"] = compile_source(f"def derive({ARGUMENTS[:-3]}):\n    return ({calls})\n", **parts)
     if law.remember is None:
-        made["remember"] = compile_source(f"def remember({ARGUMENTS}):\n    return m\n")
+        choices["remember"] = compile_source(f"def remember({ARGUMENTS}):\n    return m\n")
     else:
-        made["remember"] = bind_arguments(law.remember, ARGUMENTS, places, "({},)" if len(law.memory) == 1 else "{}")
-    names = [each.name for each in law.memory]
-    made["read_memory"] = compile_source(
+        choices["remember"] = bind_arguments(law.remember, ARGUMENTS, places, "({},)" if len(law.memory) == 1 else "{}")
+    names = [field.name for field in law.memory]
+    choices["read_memory"] = compile_source(
         f"def read_memory(memory, k):\n    return ({''.join(f'memory.{name}[k], ' for name in names)})\n"
     )
-    made["write_memory"] = compile_source(
+    choices["write_memory"] = compile_source(
         "def write_memory(memory, k, m, touching):\n"
-        + "".join(f"    memory.{each.name}[k] = m[{n}] if touching else {float(each.initial)!r}\n"  # type: ignore[arg-type]
-                  for n, each in enumerate(law.memory))
+        + "".join(f"    memory.{field.name}[k] = m[{n}] if touching else {float(field.initial)!r}\n"  # type: ignore[arg-type]
+                  for n, field in enumerate(law.memory))
         + "    return\n",
         inf=math.inf, nan=math.nan,
     )  # fmt: skip
-    return made | {"DAMPING_MEAN": law.damping_mean, "ADHESIVE": law.adhesive}
+    return choices | {"DAMPING_MEAN": law.damping_mean, "ADHESIVE": law.adhesive}
 
 
 def check_contact_law(law: ContactLaw) -> None:
@@ -309,17 +311,17 @@ def check_contact_law(law: ContactLaw) -> None:
             raise InputError(f"parameter of the contact law {law.name!r}", name, NAMES)
         if not 0.0 <= value < math.inf:
             raise InputError(f"contact_parameters.{name}", value, "at least 0 and finite")
-    for each in law.functions:
-        if not each.__module__.startswith("cfddem."):
-            check_compiles("laws.contact", each)
+    for function in law.functions:
+        if not function.__module__.startswith("cfddem."):
+            check_compiles("laws.contact", function)
     for memory in law.memory:
-        what = f"memory of the contact law {law.name!r}"
+        place = f"memory of the contact law {law.name!r}"
         if memory.components:
-            raise InputError(what, memory.name, "one number", "declare a field for each component")
+            raise InputError(place, memory.name, "one number", "declare a field for each component")
         if callable(memory.initial):
-            raise InputError(what, memory.name, "a field whose initial value is a number")
+            raise InputError(place, memory.name, "a field whose initial value is a number")
         if memory.name in TAKEN:
-            raise InputError(what, memory.name, "another name", "pairs have a field of this name")
+            raise InputError(place, memory.name, "another name", "pairs have a field of this name")
 
 
 def _places(law: ContactLaw) -> dict[str, str]:
@@ -328,7 +330,7 @@ def _places(law: ContactLaw) -> dict[str, str]:
         **{name: f"row.{name}" for name in COLUMNS},
         **{name: f"contact.{name}" for name in ContactState._fields},
         **{name: f"p.contact.{name}" for name in law.parameters},
-        **{each.name: f"m[{n}]" for n, each in enumerate(law.memory)},
+        **{field.name: f"m[{n}]" for n, field in enumerate(law.memory)},
         **{name: f"d[{n}]" for n, name in enumerate(law.derived)},
     }
 

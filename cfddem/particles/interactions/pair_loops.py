@@ -194,13 +194,13 @@ def loop_choices(
     parameters  of the run; their names count
     """
     fields = list(fields)
-    memory = named_arrays("Memory", tuple(each.name for each in fields))
+    memory = named_arrays("Memory", tuple(field.name for field in fields))
     loops = {slot: over_pairs(specialise(loop.body, choices), loop.rest, loop.particles, memory, parameters)
              for slot, loop in LOOPS.items() if choices.get(loop.needed_by, True)}  # fmt: skip
-    lines = ["put(memory.{0}, to, at(memory.{0}, k))" if each.components else "memory.{0}[to] = memory.{0}[k]"
-             for each in fields]  # fmt: skip
-    copied = [line.format(each.name) for line, each in zip(lines, fields)
-              if each.role == "memory" and each.name not in kept_apart]  # fmt: skip
+    lines = ["put(memory.{0}, to, at(memory.{0}, k))" if field.components else "memory.{0}[to] = memory.{0}[k]"
+             for field in fields]  # fmt: skip
+    copied = [line.format(field.name) for line, field in zip(lines, fields)
+              if field.role == "memory" and field.name not in kept_apart]  # fmt: skip
     return {
         **loops,
         "copy_memory": compile_source(
@@ -229,13 +229,13 @@ def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Pa
     particles  arrays of the particles that the body reads
     memory     arrays of the pairs
     """
-    arrays = {name: each(*each._fields) for name, each in
+    arrays = {name: kind(*kind._fields) for name, kind in
               (("particles", particles), ("edges", PairEnds), ("memory", memory))}  # fmt: skip
     system = PairSystem(**arrays, shift="shift", rows="rows", kinds="kinds", parameters=parameters)  # type: ignore[arg-type]
     structures: dict[str, Any] = {}
     rebuilt = _rebuilt(system, "system", structures)
     places = _places(system, "system")
-    names = ", ".join(each.replace(".", "_") for each in places)
+    names = ", ".join(place.replace(".", "_") for place in places)
     more = f", {rest}" if rest else ""
     loop = (
         f"def over_pairs(begin, end, {names}{more}):\n"
@@ -243,11 +243,11 @@ def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Pa
         f"    for n in prange(begin, end):\n"
         f"        body(n, {rebuilt}{more})\n"
     )
-    given = ", ".join({"system.rows": "rows", "system.kinds": "kinds"}.get(each, each) for each in places)
+    arguments = ", ".join({"system.rows": "rows", "system.kinds": "kinds"}.get(place, place) for place in places)
     call = (
         f"def call(begin, end, system{more}):\n"
         f"    kinds, rows = uint64(len(system.table)), system.table.reshape(-1)\n"
-        f"    over_pairs(begin, end, {given}{more})\n"
+        f"    over_pairs(begin, end, {arguments}{more})\n"
     )
     made_loop = compile_source(loop, vector_part, body=body, prange=prange, kept_whole=kept_whole, **structures)
     return compile_source(call, over_pairs=made_loop, uint64=np.uint64)
@@ -257,7 +257,7 @@ def _places(value: Any, place: str) -> list[str]:
     """Where the arrays and numbers of a structure of structures are."""
     if not hasattr(value, "_fields"):
         return [place]
-    return [inner for name, each in zip(value._fields, value) for inner in _places(each, f"{place}.{name}")]
+    return [inner for name, member in zip(value._fields, value) for inner in _places(member, f"{place}.{name}")]
 
 
 def _rebuilt(value: Any, place: str, structures: dict[str, Any]) -> str:
@@ -266,5 +266,5 @@ def _rebuilt(value: Any, place: str, structures: dict[str, Any]) -> str:
         return place.replace(".", "_")
     name = f"{place.replace('.', '_')}_of"
     structures[name] = type(value)
-    inner = [_rebuilt(each, f"{place}.{member}", structures) for member, each in zip(value._fields, value)]
+    inner = [_rebuilt(content, f"{place}.{member}", structures) for member, content in zip(value._fields, value)]
     return f"{name}({', '.join(inner)})"

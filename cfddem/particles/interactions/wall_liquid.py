@@ -36,8 +36,8 @@ def with_room(walls: Walls, edges: int) -> Walls:
     if needed <= len(walls.patch_key):
         return walls
     key, liquid = np.zeros(2 * needed, np.int64), np.zeros(2 * needed)
-    known = len(walls.patch_key)
-    key[:known], liquid[:known] = walls.patch_key, walls.patch_liquid
+    used = len(walls.patch_key)
+    key[:used], liquid[:used] = walls.patch_key, walls.patch_liquid
     return walls._replace(patch_key=key, patch_liquid=liquid)
 
 

@@ -25,7 +25,7 @@ def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:
     owner, kind, shape, corner = _pieces(walls)
     low, width, number = _cells_of_meshes(walls)
     cells = np.prod(number, axis=1)
-    made = Walls(
+    arrays = Walls(
         kind=kind,
         shape=shape,
         corner=corner,
@@ -48,17 +48,17 @@ def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:
         patch_count=np.zeros(1, np.int64),
         patch_thickest=np.zeros(1),
     )
-    return _with_cells(made) if len(made.single) < len(kind) else made
+    return _with_cells(arrays) if len(arrays.single) < len(kind) else arrays
 
 
 def checkpoint_walls(walls: Walls) -> dict[str, np.ndarray]:
     """Copies of all arrays by name."""
-    return {name: each.copy() for name, each in walls._asdict().items()}
+    return {name: array.copy() for name, array in walls._asdict().items()}
 
 
 def restored_walls(kept: Mapping[str, np.ndarray]) -> Walls:
     """The walls of a `checkpoint_walls()`."""
-    return Walls(**{name: np.array(each) for name, each in kept.items()})
+    return Walls(**{name: np.array(array) for name, array in kept.items()})
 
 
 def _pieces(walls: Sequence[Wall]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -155,34 +155,34 @@ def _list_pieces(
     walls: Walls,
     cutoff_ratio: float,
     skin: float,
-    found: NearPieces,
+    pieces: NearPieces,
     fill: bool,
 ) -> None:
-    """Count the pieces near each particle, or write them from `found.number` on."""
-    _list_single(particles.view, flat(walls), cutoff_ratio, skin, found, fill)
+    """Count the pieces near each particle, or write them from `pieces.number` on."""
+    _list_single(particles.view, flat(walls), cutoff_ratio, skin, pieces, fill)
     if len(walls.cell_member):  # the search in cells is compiled only where there are meshes
-        _list_meshes(particles.view, flat(walls), cutoff_ratio, skin, found, fill)
+        _list_meshes(particles.view, flat(walls), cutoff_ratio, skin, pieces, fill)
 
 
 @serial
-def _list_single(particles, walls, cutoff_ratio, skin, found, fill):
+def _list_single(particles, walls, cutoff_ratio, skin, pieces, fill):
     """Count or write the pieces near each particle that are no triangles."""
     for i in range(particles.owned):
         if particles.inverse_mass[i] > 0.0:
             reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
             for w in walls.single:
-                _list(i, w, walls.wall[w], particles, walls, reach, found, fill)
+                _list(i, w, walls.wall[w], particles, walls, reach, pieces, fill)
 
 
 @serial
-def _list_meshes(particles, walls, cutoff_ratio, skin, found, fill):
+def _list_meshes(particles, walls, cutoff_ratio, skin, pieces, fill):
     """Count or write the triangles near each particle."""
     for i in range(particles.owned):
         if particles.inverse_mass[i] > 0.0:
             reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
             for m in range(len(walls.sweep)):
                 if walls.cell_number[3 * m] > 0:
-                    _list_triangles(i, m, particles, walls, reach, found, fill)
+                    _list_triangles(i, m, particles, walls, reach, pieces, fill)
 
 
 @serial
@@ -198,16 +198,16 @@ def _sort_rows(values, begins, ends):
 
 
 @inline
-def _list(i, w, m, particles, walls, reach, found, fill):
+def _list(i, w, m, particles, walls, reach, pieces, fill):
     """List piece w of wall m if it is within reach of particle i."""
     if nearest(walls.kind, walls.shape, w, in_frame(walls, m, at(particles.position, i)))[1] < reach:
         if fill:
-            found.first[found.number[i]], found.second[found.number[i]] = i, w
-        found.number[i] += 1
+            pieces.first[pieces.number[i]], pieces.second[pieces.number[i]] = i, w
+        pieces.number[i] += 1
 
 
 @serial
-def _list_triangles(i, m, particles, walls, reach, found, fill):
+def _list_triangles(i, m, particles, walls, reach, pieces, fill):
     """List the triangles of mesh m within reach of particle i, each once: in the first cell within reach."""
     place = in_frame(walls, m, at(particles.position, i))
     low, high = _span(walls, m, place, place, reach)
@@ -223,7 +223,7 @@ def _list_triangles(i, m, particles, walls, reach, found, fill):
                         and y == max(low[1], begin[1], 0)
                         and z == max(low[2], begin[2], 0)
                     ):
-                        _list(i, w, m, particles, walls, reach, found, fill)
+                        _list(i, w, m, particles, walls, reach, pieces, fill)
 
 
 @inline

@@ -70,14 +70,14 @@ class WallMotions:
     @property
     def largest_step(self) -> float:
         """Longest time over which velocities may be constant [s]."""
-        fastest = max((each.frequency for each in self.motions), default=0.0)
+        fastest = max((motion.frequency for motion in self.motions), default=0.0)
         return 1.0 / (STEPS_PER_PERIOD * fastest) if fastest > 0.0 else math.inf
 
     def __call__(self, run: ParticleSolver, step: float) -> None:
         """Set the velocities for the coming step [s]."""
         if not step > 0.0:
             raise InputError("step", step, "above 0")
-        for each in self.motions:
+        for motion in self.motions:
             begin, end = run.time, run.time + step
-            run.walls.velocity[each.wall] = (each.displacement(end) - each.displacement(begin)) / step
-            run.walls.spin[each.wall] = np.array(each.spin) * ((each.active(end) - each.active(begin)) / step)
+            run.walls.velocity[motion.wall] = (motion.displacement(end) - motion.displacement(begin)) / step
+            run.walls.spin[motion.wall] = np.array(motion.spin) * ((motion.active(end) - motion.active(begin)) / step)

@@ -269,15 +269,15 @@ class Turned(Wall):
         slopes = steps[:, 1] / steps[:, 0]
         stands_out = np.concatenate([[False], np.diff(slopes) > 0.0, [False]])  # an edge of the wall, not a corner
         turns_back = stands_out.any() and (slopes < 0.0).any()
-        made = []
+        pieces = []
         for n, (begin, step) in enumerate(zip(points[:-1], steps)):
             along, length = step[::-1] / np.linalg.norm(step), float(np.linalg.norm(step))
             ends = [0.0 if stands_out[n] else -np.inf, length if stands_out[n + 1] else np.inf]
             # behind a piece with an end there may be another part of the vessel
             both = float(turns_back and bool(np.isfinite(ends).any()))
             place = np.add(self.point, begin[0] * axis)
-            made.append((REVOLVED, [*place, *axis, begin[1], *along, *ends, both]))
-        return made
+            pieces.append((REVOLVED, [*place, *axis, begin[1], *along, *ends, both]))
+        return pieces
 
     def frame(self) -> tuple[np.ndarray, float]:
         points, axis = np.asarray(self.line, float), _unit(self.axis)
