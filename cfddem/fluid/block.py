@@ -74,8 +74,8 @@ class Division:
                 for axis, planes in enumerate(self.planes(grid))
             ]
             owner = np.ravel_multi_index(at, self.shape)
-            found = np.bincount(owner, minlength=cells.size).reshape(self.shape)  # local: the same on all ranks
-            load = 0.5 * (load + found * (cells.size / len(position)))
+            particles = np.bincount(owner, minlength=cells.size).reshape(self.shape)  # local: the same on all ranks
+            load = 0.5 * (load + particles * (cells.size / len(position)))
         return float((load * with_ghosts(wide, 1.0)).max())  # local: all ranks
 
 
@@ -90,7 +90,7 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
     most = [max(count // THINNEST, 1) for count in grid.cells]
     if shape and math.prod(shape) != ranks:
         raise InputError("--division", "x".join(map(str, shape)), f"{ranks} ranks in all, one for each process")
-    options = [each for each in [shape] if each] or shapes(ranks, most)
+    options = [shape] if shape else shapes(ranks, most)
     if not options or any(n > limit for n, limit in zip(options[0], most)):
         x, y, z = grid.cells
         fewer = next(n for n in range(min(ranks, math.prod(most)), 0, -1) if shapes(n, most))
@@ -98,14 +98,14 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
         if shape:
             raise InputError("--division", "x".join(map(str, shape)), limit, "take fewer ranks along that axis")
         raise InputError("ranks", ranks, limit, f"take {fewer} ranks or more cells")
-    divisions = [_cut(grid, each, places) for each in options]
+    divisions = [_cut(grid, ranks, places) for ranks in options]
     # of shapes that take equally long the first: loops run along x, which is divided last but for z
-    return min(divisions, key=lambda each: round(each.work(grid, places), 2))  # local: known to every rank
+    return min(divisions, key=lambda division: round(division.work(grid, places), 2))  # local: known to every rank
 
 
 def _cut(grid: Grid, shape: Shape, position: Array) -> Division:
     """The division with so many ranks along x, y, z."""
-    found = []
+    of_axes = []
     for axis, (ranks, count) in enumerate(zip(shape, grid.cells)):
         load = np.full(count, 1.0)
         if len(position):
@@ -116,8 +116,8 @@ def _cut(grid: Grid, shape: Shape, position: Array) -> Division:
         for rank in range(1, ranks):
             nearest = int(np.argmin(np.abs(wanted - rank / ranks))) + 1  # local: all layers
             starts.append(min(max(nearest, starts[-1] + THINNEST), count - THINNEST * (ranks - rank)))
-        found.append((*starts, count))
-    return Division((found[0], found[1], found[2]))
+        of_axes.append((*starts, count))
+    return Division((of_axes[0], of_axes[1], of_axes[2]))
 
 
 def region_of(starts: Starts, place: Sequence[int], more: Sequence[int] = (0, 0, 0)) -> tuple[Any, ...]:
@@ -126,7 +126,7 @@ def region_of(starts: Starts, place: Sequence[int], more: Sequence[int] = (0, 0,
     place  of the rank along x, y, z
     more   layers beyond its cells along x, y, z
     """
-    cuts = [slice(int(each[n]), int(each[n + 1]) + beyond) for each, n, beyond in zip(starts, place, more)]
+    cuts = [slice(int(begins[n]), int(begins[n + 1]) + beyond) for begins, n, beyond in zip(starts, place, more)]
     return (Ellipsis, *cuts[::-1])
 
 
@@ -136,18 +136,18 @@ def put_together(values: np.ndarray, starts: Starts, communicator: Communicator,
     faces  whether the array has one layer more than cells along each axis; that between ranks is taken from the upper
     """
     shape = len(starts[0]) - 1, len(starts[1]) - 1, len(starts[2]) - 1
-    whole = np.empty((*values.shape[:-3], *(int(each[-1]) + faces for each in starts[::-1])), values.dtype)
+    whole = np.empty((*values.shape[:-3], *(int(begins[-1]) + faces for begins in starts[::-1])), values.dtype)
     parts = []
     for rank in range(communicator.size):
         place = place_of(rank, shape)
         last = [int(faces and n + 1 == ranks) for n, ranks in zip(place, shape)]
         parts.append(whole[region_of(starts, place, last)])
     nz, ny, nx = parts[communicator.rank].shape[-3:]
-    given = communicator.joined(values[..., :nz, :ny, :nx].reshape(-1))
+    joined = communicator.joined(values[..., :nz, :ny, :nx].reshape(-1))
     end = 0
     for part in parts:
         begin, end = end, end + part.size
-        part[...] = given[begin:end].reshape(part.shape)
+        part[...] = joined[begin:end].reshape(part.shape)
     return whole
 
 
@@ -178,14 +178,14 @@ def _layers(block: Block, values: np.ndarray, axis: int, faces: bool) -> Portion
 
             z = _within(mine[0], first, last)
             own = slice(z.start - mine[0].start, z.stop - mine[0].start), *(slice(r.stop - r.start) for r in mine[1:])
-            given = communicator.gathered(values[*everything, *own].reshape(-1))
-            made, end = np.empty((*before, (last - first) * (communicator.rank == 0), ny, nx, *beyond), values.dtype), 0
+            received = communicator.gathered(values[*everything, *own].reshape(-1))
+            slab, end = np.empty((*before, (last - first) * (communicator.rank == 0), ny, nx, *beyond), values.dtype), 0
             for z, y, x in regions if communicator.rank == 0 else []:
                 z = _within(z, first, last)
-                part = made[*everything, z.start - first : z.stop - first, y, x]
+                part = slab[*everything, z.start - first : z.stop - first, y, x]
                 begin, end = end, end + part.size
-                part[...] = given[begin:end].reshape(part.shape)
-            yield (*everything, slice(first, last)), made
+                part[...] = received[begin:end].reshape(part.shape)
+            yield (*everything, slice(first, last)), slab
 
     return Portions((*before, nz, ny, nx, *beyond), values.dtype, parts)
 
@@ -212,10 +212,10 @@ class Block(Grid):
         first = tuple(starts[n] for starts, n in zip(division.starts, place))
         cells: Any = tuple(starts[n + 1] - starts[n] for starts, n in zip(division.starts, place))
         origin: Any = tuple(x0 + n * h for x0, n, h in zip(whole.origin, first, whole.spacing))
-        known: Mapping[str, Any] = {
+        own: Mapping[str, Any] = {
             "_whole": whole, "_first": first, "_place": place, "division": division, "communicator": communicator,
         }  # fmt: skip
-        for name, value in known.items():
+        for name, value in own.items():
             object.__setattr__(self, name, value)
         solid = None if whole.solid is None else self.part(whole.solid)
         super().__init__(cells, whole.spacing, origin, solid, whole.walls)
@@ -247,7 +247,7 @@ class Block(Grid):
 
     def borders(self, periodic: Sequence[bool] | NDArray[np.bool_]) -> tuple[Borders, ...]:
         """See `Grid.borders`."""
-        made = []
+        borders = []
         for axis, ranks in enumerate(self.division.shape):
             beside: list[int | None] = []
             for step in (self._place[axis] - 1, self._place[axis] + 1):
@@ -256,16 +256,16 @@ class Block(Grid):
                 inside = periodic[axis] or 0 <= step < ranks
                 beside.append(int(np.ravel_multi_index(place, self.division.shape)) if inside else None)
             if ranks > 1:
-                made.append(Borders(self.communicator, axis, *beside))
-        return tuple(made)
+                borders.append(Borders(self.communicator, axis, *beside))
+        return tuple(borders)
 
     def part(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
         """The part of this rank in an array over the whole grid (..., nz, ny, nx).
 
         faces  whether the array has one layer more than cells along each axis; the part has it too
         """
-        found: np.ndarray = values[region_of(self.division.starts, self._place, (faces,) * 3)]
-        return found
+        own: np.ndarray = values[region_of(self.division.starts, self._place, (faces,) * 3)]
+        return own
 
     def joined(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
         """The array over the whole grid of which every rank has a part (..., nz, ny, nx); the opposite of `part`."""

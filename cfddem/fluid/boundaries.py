@@ -51,8 +51,8 @@ class Boundaries:
         if grid.whole is not grid:
             self._cut_out_of(Boundaries(grid.whole, conditions))
             return
-        given = dict(conditions or {})
-        for name in given:
+        by_side = dict(conditions or {})
+        for name in by_side:
             if name not in SIDES:
                 raise InputError(f"boundaries.{name}", None, "one of " + ", ".join(SIDES))
         self.periodic, self.driving = np.zeros(3, dtype=bool), np.zeros(3)
@@ -62,7 +62,7 @@ class Boundaries:
             pair = []
             for high in (False, True):
                 name = SIDES[2 * axis + high]
-                listed = given.get(name, plain)
+                listed = by_side.get(name, plain)
                 several = [listed] if isinstance(listed, Condition) else list(listed)
                 if not several:
                     raise InputError(f"boundaries.{name}", None, "a condition or a list of at least one")
@@ -187,14 +187,14 @@ class Boundaries:
         if callable(velocity):
             x, y, z = (c[here] for c in self._points(side))
             velocity = velocity(x, y, z, time)
-        given, vector = np.asarray(velocity, dtype=float), np.zeros((count, 3))
-        if given.ndim == 0 or (by_function and given.shape == (count,)):
-            vector[:, side.axis] = side.inward * given
-        elif given.shape == (count, 3) or (not by_function and given.shape == (3,)):
-            vector[:] = given
+        values, vector = np.asarray(velocity, dtype=float), np.zeros((count, 3))
+        if values.ndim == 0 or (by_function and values.shape == (count,)):
+            vector[:, side.axis] = side.inward * values
+        elif values.shape == (count, 3) or (not by_function and values.shape == (3,)):
+            vector[:] = values
         else:
             wanted = f"of shape ({count},) or ({count}, 3) for {count} faces" if by_function else "a speed or a vector"
-            raise InputError(f"boundaries.{side.name}.velocity", given.shape, wanted)
+            raise InputError(f"boundaries.{side.name}.velocity", values.shape, wanted)
         if inlet.in_time is not None and not steady:
             vector *= float(inlet.in_time(time))
         bad = ~np.isfinite(vector).all(axis=1)
@@ -268,8 +268,8 @@ class Boundaries:
             if side.outlet.any():
                 n = self.grid.cells[side.axis]
                 inside, ghost = (n + LOW - 1, n + LOW) if side.high else (LOW, LOW - 1)
-                held = 0.0 if correction else 2.0 * side.pressure
-                value = held - side.layer(pressure, inside)
+                twice_at_face = 0.0 if correction else 2.0 * side.pressure
+                value = twice_at_face - side.layer(pressure, inside)
                 side.layer(pressure, ghost)[side.outlet] = value[side.outlet]
 
     def fill_velocity(self, velocity: Array) -> None:
@@ -312,13 +312,13 @@ class Side:
 
         here  which cells of the whole grid the block has along z, y, x
         """
-        made = Side(self.name, self.axis, self.high, self.conditions)
+        part = Side(self.name, self.axis, self.high, self.conditions)
         across = tuple(cells for n, cells in enumerate(here) if n != 2 - self.axis)
         padded: Any = (Ellipsis, *(slice(cells.start, cells.stop + LOW + HIGH) for cells in across))
-        made.owner, made.inlets = self.owner[across], self.inlets
-        made.mirror, made.wall = self.mirror[padded].copy(), self.wall[padded].copy()
-        made.outlet, made.pressure = self.outlet[padded].copy(), self.pressure[padded].copy()
-        return made
+        part.owner, part.inlets = self.owner[across], self.inlets
+        part.mirror, part.wall = self.mirror[padded].copy(), self.wall[padded].copy()
+        part.outlet, part.pressure = self.outlet[padded].copy(), self.pressure[padded].copy()
+        return part
 
     @property
     def inward(self) -> float:

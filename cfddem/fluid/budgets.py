@@ -36,8 +36,8 @@ def drag_exchange(fluid: FluidSolver) -> Array:
     round-off. h is the step just made, V the cell. Half the drag of a cell acts on each of its two faces; where a
     face is a wall or an inlet, that half is taken by what holds the face, and is counted here too.
     """
-    fields, (weight, seen) = fluid.fields, fluid.drag_response()
-    push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - fields.owned("drag")[..., None] * seen
+    fields, (weight, velocity) = fluid.fields, fluid.drag_response()
+    push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - fields.owned("drag")[..., None] * velocity
     moved: Array = fluid.last_step * fluid.grid.cell_volume * weight * push * _held(fluid)[..., None]
     return moved
 
@@ -60,13 +60,13 @@ def momentum_ledger(fluid: FluidSolver) -> dict[str, Array]:
     fields, total = fluid.fields, fluid.communicator.sum
     h, volume = fluid.last_step, fluid.grid.cell_volume
     before = _momentum(fluid, fields.other_velocity, fields.other_voidage)
-    held = _held(fluid)
-    share = held if fluid.model == "B" else held * fields.owned("centred_voidage")
+    open_share = _held(fluid)
+    share = open_share if fluid.model == "B" else open_share * fields.owned("centred_voidage")
     lines = {
         "change": momentum(fluid) - before,
         "drag": total(drag_exchange(fluid), axis=(0, 1, 2)),
         "particles": np.zeros(3) if fluid.model == "B" else _pressure_on_particles(fluid),
-        "source": h * volume * total(fields.owned("source") * held, axis=(1, 2, 3)),
+        "source": h * volume * total(fields.owned("source") * open_share, axis=(1, 2, 3)),
         "driving": h * volume * total(share) * fluid.boundaries.driving,
     }
     lines["boundaries"] = lines["change"] - sum(lines[name] for name in lines if name != "change")
@@ -91,14 +91,14 @@ def _momentum(fluid: FluidSolver, velocity: Array, voidage: Array) -> Array:
 
 def _pressure_on_particles(fluid: FluidSolver) -> Array:
     """Momentum that model A takes from the fluid where the voidage varies, sum of h V p grad(eps) (3,) [N s]."""
-    own, solved, given = fluid.fields.centred_voidage, fluid.faces.solved, np.zeros(3)
+    own, solved, force = fluid.fields.centred_voidage, fluid.faces.solved, np.zeros(3)
     for d in range(3):
         axis = 2 - d
         low = np.where(solved[d] > 0.0, on_faces(own, d), own)
         high = np.where(np.roll(solved[d], -1, axis) > 0.0, 0.5 * (own + np.roll(own, -1, axis)), own)
         pushed = fluid.communicator.sum(fluid.pressure * fluid.grid.inner(high - low))
-        given[d] = fluid.last_step * fluid.face_areas[d] * pushed
-    return given
+        force[d] = fluid.last_step * fluid.face_areas[d] * pushed
+    return force
 
 
 def continuity_residual(fluid: FluidSolver) -> Array:
@@ -137,11 +137,11 @@ def works(fluid: FluidSolver) -> Works:
     for d in range(3):
         for name, work in _work_on_faces(fluid, d, 0.5 * (start[d] + end[d]), stiff[d]).items():
             sums[name] = sums.get(name, 0.0) + fluid.communicator.sum(work * volumes[d])
-    pressed, brought, held = _at_sides(fluid)
+    pressed, brought, by_inlets = _at_sides(fluid)
     return Works(
         kinetic=sums["kinetic"],
         inflow=pressed + brought,
-        held=held,
+        held=by_inlets,
         driving=sums["driving"],
         solids=sums["pressure"] - pressed,
         model_b=sums["model_b"],
@@ -184,7 +184,7 @@ def _work_on_faces(fluid: FluidSolver, d: int, stress: Array, stiff: Array) -> d
     old, new = fields.other_velocity[d], fields.velocity[d]
     mean = 0.5 * (old + new)
     stored, centred, ended = (
-        on_faces(each, d) for each in (fields.stored_voidage, fields.centred_voidage, fields.mean_voidage)
+        on_faces(voidage, d) for voidage in (fields.stored_voidage, fields.centred_voidage, fields.mean_voidage)
     )
     explicit = 0.5 * (fields.start_force[d] + fields.stage_force[d])
     gradient = (fields.pressure - np.roll(fields.pressure, 1, 2 - d)) * fluid.inverse_spacing[d]
@@ -225,8 +225,8 @@ def _at_sides(fluid: FluidSolver) -> tuple[float, float, float]:
     for side in fluid.boundaries.sides:
         inlet, outlet = np.isin(side.owner, side.inlets), _inner(side.outlet)
         of_sides.append([*_at_side(fluid, side, inlet, outlet)])
-    pressed, brought, held = (float(fluid.communicator.sum(np.concatenate(faces))) for faces in zip(*of_sides))
-    return pressed, brought, held
+    pressed, brought, by_inlets = (float(fluid.communicator.sum(np.concatenate(faces))) for faces in zip(*of_sides))
+    return pressed, brought, by_inlets
 
 
 def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarray) -> tuple[Array, Array, Array]:
@@ -242,7 +242,7 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     mean = 0.5 * (old + new)
     voidage = layer(on_faces(fields.centred_voidage, d), at_face)
     cut = fluid.boundaries.cut
-    apertures, volumes = (np.broadcast_to(each, fluid.fields.drag.shape) for each in (cut.of_faces(d), cut.volume))
+    apertures, volumes = (np.broadcast_to(share, fluid.fields.drag.shape) for share in (cut.of_faces(d), cut.volume))
     area = fluid.grid.face_area(d) * layer(apertures, at_face)
     flow = side.inward * voidage * mean * h * area  # volume that came in [m3]
     pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))

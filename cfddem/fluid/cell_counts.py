@@ -55,8 +55,8 @@ def suggested_cells(
     wanted, shortest = min(map(float, edges)), min(lengths)
     if max(widths) <= min(widths) * (1.0 + FIT):
         counts = range(1, math.ceil(min(FARTHEST * shortest / wanted, FINEST)) + 1)
-        cubes = [edge for edge in (shortest / each for each in counts) if _fits(edge, lengths) and suits(edge)]
-        nearest = min(cubes, key=lambda each: abs(math.log(each / wanted)), default=0.0)
+        cubes = [edge for edge in (shortest / count for count in counts) if _fits(edge, lengths) and suits(edge)]
+        nearest = min(cubes, key=lambda edge: abs(math.log(edge / wanted)), default=0.0)
         if wanted / FARTHEST <= nearest <= wanted * FARTHEST:
             return f"{_short(nearest, lengths)} m fits along x, y and z"
     return f"[{', '.join(edges)}] m fits"
@@ -65,12 +65,14 @@ def suggested_cells(
 def _nearest_edge(length: float, width: float, suits: Callable[[float], bool]) -> str:
     """The edge of a cell nearest to a given one, or the next larger one that suits, which fits a length."""
     most = max(round(min(length / width, FINEST)), 1)
-    count = next((each for each in range(most, 0, -1) if suits(length / each)), most)
+    count = next((count for count in range(most, 0, -1) if suits(length / count)), most)
     return _short(length / count, (length,))
 
 
 def _fits(width: float, lengths: Sequence[float]) -> bool:
-    return all(abs(round(each / width) * width - each) <= FIT * each and each >= 0.5 * width for each in lengths)
+    return all(
+        abs(round(length / width) * width - length) <= FIT * length and length >= 0.5 * width for length in lengths
+    )
 
 
 def _short(width: float, lengths: Sequence[float]) -> str:

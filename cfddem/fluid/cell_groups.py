@@ -52,7 +52,7 @@ def _on_one_side(
     grid: Grid, small: NDArray[np.bool_], cells: NDArray[np.int64], home: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """The homes of all cells, where those of some small cells have no thin wall before them, or are these cells."""
-    centres = [np.ravel(each) for each in np.broadcast_arrays(*grid.centres())]
+    centres = [np.ravel(coordinate) for coordinate in np.broadcast_arrays(*grid.centres())]
     places = np.stack(centres, axis=-1) + ASIDE * np.array(grid.spacing)
     across = cells[grid.walls.thin.between(places[cells], places[home[cells]])]
     steps = np.indices((2 * REACH + 1,) * 3).reshape(3, -1).T - REACH

@@ -14,16 +14,16 @@ from cfddem.fluid.grid import Array, Grid
 def checked_voidage(grid: Grid, voidage: Array | float, communicator: Communicator) -> Array:
     """The voidage (nz, ny, nx), 1 in solid cells; `InputError` unless it lies in (0, 1] everywhere."""
     try:
-        given = np.where(grid.open, np.asarray(voidage, dtype=float), 1.0)
+        values = np.where(grid.open, np.asarray(voidage, dtype=float), 1.0)
     except ValueError as refusal:
         raise InputError("voidage", np.shape(voidage), f"of shape (nz, ny, nx) = {grid.shape}") from refusal
-    if given.shape != grid.shape:
+    if values.shape != grid.shape:
         raise InputError("voidage", np.shape(voidage), f"of shape (nz, ny, nx) = {grid.shape}")
-    wrong = _first_place(~((given > 0.0) & (given <= 1.0 + 1e-12)), given, communicator)
+    wrong = _first_place(~((values > 0.0) & (values <= 1.0 + 1e-12)), values, communicator)
     if wrong is not None:
         cell, value = wrong
         raise InputError("voidage", value, "above 0 and at most 1", f"it is not in cell [k, j, i] = {cell}")
-    return given
+    return values
 
 
 def checked_viscosity(grid: Grid, viscosity: Array | float, communicator: Communicator) -> Array:
@@ -54,25 +54,25 @@ def checked_field(
 
     negative  whether values below zero are allowed
     """
-    given = np.asarray(field, dtype=float)
-    if given.shape != shape:
-        raise InputError(name, given.shape, f"of shape {shape}")
-    wrong = _first_place(~np.isfinite(given), given, communicator)
+    values = np.asarray(field, dtype=float)
+    if values.shape != shape:
+        raise InputError(name, values.shape, f"of shape {shape}")
+    wrong = _first_place(~np.isfinite(values), values, communicator)
     if wrong is not None:
         raise InputError(name, None, "finite everywhere", f"it is not at {wrong[0]}")
-    least = np.inf if negative else communicator.smallest(given)
+    least = np.inf if negative else communicator.smallest(values)
     if least < 0.0:
         raise InputError(name, least, "zero or positive everywhere")
-    return given
+    return values
 
 
 def _first_place(wrong: np.ndarray, values: Array, communicator: Communicator) -> tuple[list[int], float] | None:
     """Index and value of the first wrong element of an array; None if no element is wrong on any rank."""
-    found = None
+    place = None
     if wrong.any():  # local: this rank names the place, the communicator decides
         index = np.unravel_index(np.argmax(wrong), wrong.shape)  # local: first on this rank
-        found = [int(n) for n in index], float(values[index])
-    return communicator.first(found)
+        place = [int(n) for n in index], float(values[index])
+    return communicator.first(place)
 
 
 def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:

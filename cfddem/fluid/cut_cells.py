@@ -63,9 +63,9 @@ def within(grid: Grid, surface: Surface) -> Grid:
     solid = volume < SMALLEST_VOLUME
     if solid.all():
         raise InputError("walls", None, "around some of the fluid", "no cell holds fluid; check centre and radius")
-    made: Any = replace(grid, solid=solid, walls=surface)
-    _refuse_hidden_walls(made, surface)
-    return made  # type: ignore[no-any-return]
+    cut_grid: Any = replace(grid, solid=solid, walls=surface)
+    _refuse_hidden_walls(cut_grid, surface)
+    return cut_grid  # type: ignore[no-any-return]
 
 
 def open_share(grid: Grid) -> Array | NDArray[np.bool_]:
@@ -111,7 +111,7 @@ def _regions(is_open: NDArray[np.bool_], parted: NDArray[np.bool_]) -> int:
     for d in range(3):
         here = ~parted[d]
         pairs.append((number[here], np.roll(number, 1, axis=2 - d)[here]))
-    low, high = (np.concatenate(each) for each in zip(*pairs))
+    low, high = (np.concatenate(numbers) for numbers in zip(*pairs))
     graph = coo_array((np.ones(low.size), (low, high)), shape=(is_open.size, is_open.size))
     count = connected_components(graph, directed=False)[0]
     return int(count - (~is_open).sum())
@@ -130,10 +130,10 @@ def section(surface: Surface, points: Sequence[Array], axis: int, spacing: Seque
     centre = surface.distance(*points)
     whole = (centre > 0.0).astype(float), centre.copy(), centre**2, np.array(surface.velocity(*points)[axis])
     near = np.flatnonzero(np.abs(centre) < REACH * float(np.linalg.norm(spacing)))
-    flat = [np.ravel(each) for each in points]
+    flat = [np.ravel(coordinate) for coordinate in points]
     for begin in range(0, near.size, AT_ONCE):
         here = near[begin : begin + AT_ONCE]
-        cut = _cut(surface, [each[here] for each in flat], axis, spacing)
+        cut = _cut(surface, [coordinate[here] for coordinate in flat], axis, spacing)
         for values, of_these in zip(whole, cut):
             values.ravel()[here] = of_these
     return Section(*whole)
@@ -143,12 +143,12 @@ def _cut(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence
     """Sections by rectangles around points (n,), each of a lattice of triangles."""
     lattice = np.linspace(-0.5, 0.5, PARTS + 1)
     first, second = (d for d in range(3) if d != axis)
-    at: list[Array] = [each[:, None, None] for each in points]
+    at: list[Array] = [coordinate[:, None, None] for coordinate in points]
     at[first] = at[first] + spacing[first] * lattice[:, None]
     at[second] = at[second] + spacing[second] * lattice
     shape = (points[0].size, PARTS + 1, PARTS + 1)
     at = list(np.broadcast_arrays(*at))
-    fields = np.stack([np.broadcast_to(each, shape) for each in (surface.distance(*at), surface.velocity(*at)[axis])])
+    fields = np.stack([np.broadcast_to(field, shape) for field in (surface.distance(*at), surface.velocity(*at)[axis])])
     a, b, c, e = fields[..., :-1, :-1], fields[..., 1:, :-1], fields[..., :-1, 1:], fields[..., 1:, 1:]
     halves = [_triangle(a, b, e), _triangle(a, c, e)]
     share, mean, square, sliding = (0.5 * (p + q).mean(axis=(1, 2)) for p, q in zip(*halves))
@@ -202,7 +202,7 @@ def contents(surface: Surface, spacing: Sequence[float], *centres: Array) -> tup
     for d in range(3):
         here = along == d
         for part in range(PARTS):
-            points = [each[here] for each in centres]
+            points = [coordinate[here] for coordinate in centres]
             points[d] = points[d] + spacing[d] * ((part + 0.5) / PARTS - 0.5)
             cut = section(surface, points, d, spacing)
             total[here] += cut.share / PARTS
@@ -247,7 +247,7 @@ def cut_cells(grid: Grid, halo: Halo) -> WholeCells:
     if not grid.walls:
         return WholeCells()
     if grid.whole is grid:
-        return cut_cells_of_box(grid, tuple(bool(each) for each in halo.periodic))
+        return cut_cells_of_box(grid, tuple(bool(periodic) for periodic in halo.periodic))
     return CutCells(grid, halo)
 
 

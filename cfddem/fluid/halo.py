@@ -148,10 +148,10 @@ class Halo:
         self.periodic, self.low, self.high, self.borders = np.array(periodic, bool), low, high, tuple(borders)
         self._cells = np.array([cells], dtype=np.int64)
         self.ends = np.ones((3, 2), bool)
-        for each in self.borders:
-            self.ends[each.axis] = each.below is None, each.above is None
+        for border in self.borders:
+            self.ends[border.axis] = border.below is None, border.above is None
         self.ends[self.periodic] = False
-        self._wraps = self.periodic & ~np.isin(range(3), [each.axis for each in self.borders])
+        self._wraps = self.periodic & ~np.isin(range(3), [border.axis for border in self.borders])
         # A direction that is not periodic has one more face than cells.
         self._faces = self._cells + np.diag(self.ends[:, 1])
 
@@ -171,8 +171,8 @@ class Halo:
 
     def fill_borders(self, fields: Array) -> None:
         """Fill the ghosts that other ranks own, of fields (..., nz, ny, nx)."""
-        for each in self.borders:
-            each.fill(fields, self.low, self.high)
+        for border in self.borders:
+            border.fill(fields, self.low, self.high)
 
     def fill_faces(self, vector: Array) -> None:
         """Fill the ghosts of a face field (3, nz, ny, nx), but those beyond sides that are not periodic, which boundary
@@ -185,20 +185,20 @@ class Halo:
 
         outside  value of ghosts beyond sides that are not periodic; that of the nearest cell if None
         """
-        given = np.asarray(values, dtype=float)
-        shape = tuple(n + self.low + self.high for n in given.shape[-3:])
-        made = np.full((*given.shape[:-3], *shape), 0.0 if outside is None else outside)
-        self.inner(made)[:] = given
-        fill_ghosts(made.reshape(-1, *shape), self.low, self._cells, self._wraps, self.ends & (outside is None))
-        self.fill_borders(made)
-        return made
+        inside = np.asarray(values, dtype=float)
+        shape = tuple(n + self.low + self.high for n in inside.shape[-3:])
+        array = np.full((*inside.shape[:-3], *shape), 0.0 if outside is None else outside)
+        self.inner(array)[:] = inside
+        fill_ghosts(array.reshape(-1, *shape), self.low, self._cells, self._wraps, self.ends & (outside is None))
+        self.fill_borders(array)
+        return array
 
     def extended(self, plane: np.ndarray, axis: int) -> np.ndarray:
         """Values (..., a, b) over a side normal to `axis`, continued into the ghost rows around it as `fill` would."""
         for at, other in zip((-2, -1), [d for d in (2, 1, 0) if d != axis]):
             layers, n = np.arange(-self.low, plane.shape[at] + self.high), plane.shape[at]
             plane = plane.take(layers % n if self._wraps[other] else layers.clip(0, n - 1), axis=at)
-            for each in self.borders:
-                if each.axis == other:
-                    each.fill(plane, self.low, self.high, plane.ndim + at)
+            for border in self.borders:
+                if border.axis == other:
+                    border.fill(plane, self.low, self.high, plane.ndim + at)
         return plane

@@ -289,15 +289,15 @@ def half_of_drag(here, other, free, velocity, medium, step):
 
 
 @threaded
-def drag_seen(balance, new, medium, step, weight, seen):
-    """Weight W and velocity u_d with which the drag of every cell has acted over a step: half on each face.
+def drag_seen(balance, new, medium, step, weight, mean):
+    """Weight W and mean velocity u_d with which the drag of every cell has acted over a step: half on each face.
 
-    weight, seen  padded (3, ...); only cells are written
+    weight, mean  padded (3, ...); only cells are written
     """
     old, voidage, drag, solved = balance.old, balance.centred, balance.drag, balance.solved
     shape, steps = voidage.shape, strides(voidage.shape)
     voidage, drag, solved = voidage.reshape(-1), drag.reshape(-1), solved.reshape(3, -1)
-    old, new, weight, seen = old.reshape(3, -1), new.reshape(3, -1), weight.reshape(3, -1), seen.reshape(3, -1)
+    old, new, weight, mean = old.reshape(3, -1), new.reshape(3, -1), weight.reshape(3, -1), mean.reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
         e_here, b_here = line(voidage, at, n), line(drag, at, n)
@@ -308,7 +308,7 @@ def drag_seen(balance, new, medium, step, weight, seen):
             free_low, free_high = line(solved[d], at, n), line(solved[d], above, n)
             old_low, old_high = line(old[d], at, n), line(old[d], above, n)
             new_low, new_high = line(new[d], at, n), line(new[d], above, n)
-            out, out_seen = line(weight[d], at, n), line(seen[d], at, n)
+            out, out_seen = line(weight[d], at, n), line(mean[d], at, n)
             for i in range(n):
                 here, below_it, above_it = (e_here[i], b_here[i]), (e_below[i], b_below[i]), (e_above[i], b_above[i])
                 low, u_low = half_of_drag(here, below_it, free_low[i], (old_low[i], new_low[i]), medium, step)

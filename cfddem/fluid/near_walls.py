@@ -117,7 +117,7 @@ class NearWalls(NoWalls):
         for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
             at = faces.stiff_at.astype(np.int64)
             old, stage, new = (
-                each[d].ravel()[at] for each in (fields.other_velocity, fields.stage_velocity, fields.velocity)
+                field[d].ravel()[at] for field in (fields.other_velocity, fields.stage_velocity, fields.velocity)
             )
             theta = implicitness.py_func(
                 resistance * step / (density * on_faces(fields.centred_voidage, d).ravel()[at])
@@ -163,10 +163,10 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
             high, cross = at + side * steps[e], sections[e][side]
             area = cross.share.ravel()[at] * inverse[e] / open_share
             closed = edges[e][side].ravel()[at]
-            made, of_walls = _gradient(profiles, high - steps[e], high, cross.distance.ravel()[at], inverse[e])
-            made, of_walls = (1.0 - closed) * made, (1.0 - closed) * of_walls
-            made[1 - side] += (2.0 - 4.0 * side) * inverse[e] * closed  # it sticks to a thin wall half a cell away
-            weight[e, 4 * side : 4 * side + 4], constant[e, side] = area * made, area * of_walls
+            weights, of_walls = _gradient(profiles, high - steps[e], high, cross.distance.ravel()[at], inverse[e])
+            weights, of_walls = (1.0 - closed) * weights, (1.0 - closed) * of_walls
+            weights[1 - side] += (2.0 - 4.0 * side) * inverse[e] * closed  # it sticks to a thin wall half a cell away
+            weight[e, 4 * side : 4 * side + 4], constant[e, side] = area * weights, area * of_walls
             stiff += weight[e, 1] if side == 0 else -weight[e, 4]
         further[e] = profiles.next[at - steps[e]] - place, profiles.next[at + steps[e]] - place
     stiff -= 2.0 * float(np.sum(inverse**2))
@@ -174,7 +174,7 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     pull[:2] = profiles.shear[:, at] * wall_area
     pull[2] = -(pull[:2] * profiles.sliding[[at, farther]]).sum(axis=0)
     stiff += pull[0]
-    held = stiff > 0.0
+    is_stiff = stiff > 0.0
     # beyond an outlet the fluid is not continuous: convection and growth there act on equally much fluid, or u grows
     at_outlet = np.isin(at // steps[d] % shape[2 - d], [layer for axis, layer in outlets if axis == d])
     acting = np.where(at_outlet, np.maximum(open_share, FULL), open_share)
@@ -189,7 +189,7 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     return Faces(
         d, place.astype(np.uint32)[fill], pattern, of_patterns(acting), of_patterns(weight),
         of_patterns(constant) if constant.any() else np.zeros((0, 3, 2, BLOCK)), of_patterns(further),
-        of_patterns(beside), of_patterns(pull), at[held].astype(np.uint32), stiff[held], inverse,
+        of_patterns(beside), of_patterns(pull), at[is_stiff].astype(np.uint32), stiff[is_stiff], inverse,
     )  # fmt: skip
 
 
@@ -205,11 +205,11 @@ def _in_blocks(planes: Any) -> Any:
 
 def _patterns(values: Sequence[Array], fill: Any) -> tuple[Any, Any]:
     """Which blocks have equal values up to round-off: the pattern of each block, and the first block of each."""
-    known: dict[bytes, int] = {}
+    patterns: dict[bytes, int] = {}
     number = []
     for block in fill:
-        key = b"".join((np.round(each[..., block].astype(float), 9) + 0.0).tobytes() for each in values)
-        number.append(known.setdefault(key, len(known)))
+        key = b"".join((np.round(array[..., block].astype(float), 9) + 0.0).tobytes() for array in values)
+        number.append(patterns.setdefault(key, len(patterns)))
     pattern = np.array(number, np.int64)
     return pattern, np.unique(pattern, return_index=True)[1]
 
@@ -231,9 +231,9 @@ def _sections(cut: CutCells, d: int, e: int) -> list[Any]:
     offset = [0.5, 0.5, 0.5]
     if e != d:
         offset[d] = offset[e] = 0.0
-    made = section(cut.surface, cut.points(offset), e, cut.grid.spacing)
-    moved = type(made)(*(np.roll(each, 1 if e == d else -1, 2 - e) for each in made))
-    return [moved, made] if e == d else [made, moved]
+    middle = section(cut.surface, cut.points(offset), e, cut.grid.spacing)
+    moved = type(middle)(*(np.roll(field, 1 if e == d else -1, 2 - e) for field in middle))
+    return [moved, middle] if e == d else [middle, moved]
 
 
 def _closed_edges(cut: CutCells, d: int, e: int) -> list[Array]:
@@ -274,15 +274,17 @@ def _profiles(cut: CutCells, d: int) -> Profiles:
     near_d, far_d = distance.ravel(), distance.ravel()[farther]
     near_e, far_e = depth.ravel(), depth.ravel()[farther]
     is_open = (cut.aperture[d] > 0.0).ravel()
-    known = is_open & is_open[farther] & whole & (far_e - near_e > LEAST_RISE * np.array(spacing)[steepest].ravel())
-    k = np.where(known, 1.0 / np.where(known, far_e - near_e, 1.0), 0.0)
+    has_farther = (
+        is_open & is_open[farther] & whole & (far_e - near_e > LEAST_RISE * np.array(spacing)[steepest].ravel())
+    )
+    k = np.where(has_farther, 1.0 / np.where(has_farther, far_e - near_e, 1.0), 0.0)
     own = np.where(is_open, 1.0 / np.where(is_open, near_d, 1.0), 0.0)
-    other = np.where(known, 1.0 / np.where(known, far_d, 1.0), 0.0)
+    other = np.where(has_farther, 1.0 / np.where(has_farther, far_d, 1.0), 0.0)
     shear = np.stack([(1.0 + k * near_e) * own, -k * near_e * other])
     curvature = np.stack([k * own, -k * other])
     return Profiles(
         is_open, near_d, cut.shift[d].ravel(), cut.sliding[d].ravel(), cut.swerve[d].ravel(),
-        np.where(known, farther, np.arange(near_d.size)), shear, curvature,
+        np.where(has_farther, farther, np.arange(near_d.size)), shear, curvature,
     )  # fmt: skip
 
 

@@ -39,37 +39,37 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
     steps = strides(viscosity.shape)
     u, mu, out, flux = velocity.reshape(-1), viscosity.reshape(-1), rate.reshape(-1), flux.reshape(3, -1)
     for block in prange(len(faces.place)):
-        pattern, known, sums = faces.pattern[block], np.empty((8, BLOCK)), np.zeros((3, BLOCK))
-        _gather(faces, block, pattern, steps, u, mu, known)
+        pattern, terms, sums = faces.pattern[block], np.empty((8, BLOCK)), np.zeros((3, BLOCK))
+        _gather(faces, block, pattern, steps, u, mu, terms)
         for e in range(3):
             if e == faces.axis:
-                _take_centres(faces, block, steps[e], 2 * steps[2], flux[e], known)
+                _take_centres(faces, block, steps[e], 2 * steps[2], flux[e], terms)
             else:
-                _take_edges(faces, block, (steps[e], steps[faces.axis]), 2 * steps[2], flux[e], mu, known)
-            _balance(faces, (block, pattern, e), steps, u, central, known, sums)
-        _per_volume(faces, pattern, known, density, sums)
+                _take_edges(faces, block, (steps[e], steps[faces.axis]), 2 * steps[2], flux[e], mu, terms)
+            _balance(faces, (block, pattern, e), steps, u, central, terms, sums)
+        _per_volume(faces, pattern, terms, density, sums)
         place, within = faces.place[block], out[2 * steps[2] :]
         for i in range(BLOCK):
             within[place[i]] = sums[0, i]
 
 
 @vector_inline
-def _gather(faces, block, pattern, steps, u, mu, known):
+def _gather(faces, block, pattern, steps, u, mu, terms):
     """Write what all directions use: velocities of the faces of a block and of the next ones, viscosities beside."""
     at, farther, back, first = faces.place[block], faces.farther[pattern], steps[faces.axis], 2 * steps[2]
     # places count from `first`, the first face that all neighbours can have, in all slices
     here, left, right = u[first:], mu[first - back :], mu[first:]
-    velocity, other, m_left, m_right = known[0], known[1], known[2], known[3]
+    velocity, other, m_left, m_right = terms[0], terms[1], terms[2], terms[3]
     for i in range(velocity.size):
         p = at[i]
         velocity[i], other[i], m_left[i], m_right[i] = here[p], u[p + farther[i]], left[p], right[p]
 
 
 @vector_inline
-def _take_centres(faces, block, step, first, flux, known):
+def _take_centres(faces, block, step, first, flux, terms):
     """Write viscosity and flux on the momentum faces of a block along its own axis, which are centres of cells."""
     at, low, here, high = faces.place[block], flux[first - step :], flux[first:], flux[first + step :]
-    m_left, m_right, m_low, m_high, inward, outward = known[2:]
+    m_left, m_right, m_low, m_high, inward, outward = terms[2:]
     for i in range(at.size):
         p = at[i]
         m_low[i], m_high[i] = m_left[i], m_right[i]
@@ -77,14 +77,14 @@ def _take_centres(faces, block, step, first, flux, known):
 
 
 @vector_inline
-def _take_edges(faces, block, steps, first, flux, mu, known):
+def _take_edges(faces, block, steps, first, flux, mu, terms):
     """As `_take_centres`, along another axis, where momentum faces lie around edges of the grid."""
     at, (step, back) = faces.place[block], steps
     f_left_low, f_left_high = flux[first - back :], flux[first - back + step :]
     f_right_low, f_right_high = flux[first:], flux[first + step :]
     m_left_low, m_left_high = mu[first - back - step :], mu[first - back + step :]
     m_right_low, m_right_high = mu[first - step :], mu[first + step :]
-    m_left, m_right, m_low, m_high, inward, outward = known[2:]
+    m_left, m_right, m_low, m_high, inward, outward = terms[2:]
     for i in range(at.size):
         p, beside = at[i], m_left[i] + m_right[i]
         m_low[i] = 0.25 * (m_left_low[p] + m_right_low[p] + beside)
@@ -93,13 +93,13 @@ def _take_edges(faces, block, steps, first, flux, mu, known):
 
 
 @vector_inline
-def _balance(faces, which, steps, u, central, known, sums):
+def _balance(faces, which, steps, u, central, terms, sums):
     """Add the parts of both momentum faces of a block along e: stress, convection, growth of the fluid."""
     stress, away, growth = sums
     block, pattern, e = which
     at, step, first = faces.place[block], steps[e], 2 * steps[2]
     low2, low, high, high2 = u[first - 2 * step :], u[first - step :], u[first + step :], u[first + 2 * step :]
-    here, farther, m_low, m_high, inward, outward = known[0], known[1], known[4], known[5], known[6], known[7]
+    here, farther, m_low, m_high, inward, outward = terms[0], terms[1], terms[4], terms[5], terms[6], terms[7]
     next_low, next_high = faces.next[pattern, e, 0], faces.next[pattern, e, 1]
     w, inverse = faces.weight[pattern, e], faces.inverse[e]
     w0, w1, w2, w3, w4, w5, w6, w7 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7]
@@ -120,10 +120,10 @@ def _balance(faces, which, steps, u, central, known, sums):
 
 
 @vector_inline
-def _per_volume(faces, pattern, known, density, sums):
+def _per_volume(faces, pattern, terms, density, sums):
     """Take the pull of the wall into the stress of a block, and convection and growth per volume."""
     stress, away, growth = sums
-    here, farther, left, right = known[0], known[1], known[2], known[3]
+    here, farther, left, right = terms[0], terms[1], terms[2], terms[3]
     share, own, other = faces.share[pattern], faces.pull[pattern, 0], faces.pull[pattern, 1]
     constant = faces.pull[pattern, 2]
     for i in range(stress.size):
@@ -149,21 +149,21 @@ def hold_near_walls(faces, viscosity, voidage, velocities, mobility, resistance,
     count = faces.stiff_at.size
     for block in prange((count + BLOCK - 1) // BLOCK):
         begin, end = block * BLOCK, min((block + 1) * BLOCK, count)
-        at, of_block, held = faces.stiff_at[begin:end], resistance[begin:end], np.empty((2, end - begin))
+        at, of_block, results = faces.stiff_at[begin:end], resistance[begin:end], np.empty((2, end - begin))
         if step[1] == 0.0:  # both stages have the same mobility, and with it the same pressure equation
             stiff = faces.stiff[begin:end]
             for i in range(at.size):
                 of_block[i] = stiff[i] * (0.5 * (mu[at[i]] + mu[at[i] - back]))
-        _held(at, (eps, back), (old, stage, new, mobility), of_block, fluid, step, held)
+        _held(at, (eps, back), (old, stage, new, mobility), of_block, fluid, step, results)
         for i in range(at.size):
-            new[at[i]], mobility[at[i]] = held[0, i], held[1, i]
+            new[at[i]], mobility[at[i]] = results[0, i], results[1, i]
 
 
 @vector_inline
-def _held(at, voidage, faces, resistance, fluid, step, held):
+def _held(at, voidage, faces, resistance, fluid, step, results):
     """Write velocity and mobility of a block."""
     (eps, back), (old, stage, new, mobility), (density, model_b), (step, weight) = voidage, faces, fluid, step
-    velocity, lost = held
+    velocity, lost = results
     for i in range(velocity.size):
         p, stiffness = at[i], resistance[i]
         at_face, before, moved = 0.5 * (eps[p] + eps[p - back]), old[p], mobility[p]

@@ -91,8 +91,8 @@ class ScalarFlow:
 
     def __init__(self, fluid: FluidSolver) -> None:
         self.fluid, self.time = fluid, math.nan
-        cells = [CellField(each, "", "") for each in ("growth", "outflow", "lost")]
-        self.fields = CellFields(fluid.grid, [*cells, *(CellField(each, "", "", "faces") for each in ("flux", "gate"))])
+        cells = [CellField(name, "", "") for name in ("growth", "outflow", "lost")]
+        self.fields = CellFields(fluid.grid, [*cells, *(CellField(name, "", "", "faces") for name in ("flux", "gate"))])
         self.least = np.ones(fluid.grid.shape)
         self.growth, self.groups = self.fields.owned("growth"), cell_groups(fluid)
         is_open = fluid.boundaries.halo.padded(fluid.grid.open, outside=0.0)
@@ -142,14 +142,14 @@ class Scalar:
 
     def __init__(self, fluid: FluidSolver, kind: ScalarKind, sides: ScalarSides) -> None:
         self.fluid, self.kind, self.grid = fluid, kind, fluid.grid
-        others = [each for each in fluid.followers if isinstance(each, Scalar)]
+        others = [scalar for scalar in fluid.followers if isinstance(scalar, Scalar)]
         self.flow: ScalarFlow = others[0].flow if others else ScalarFlow(fluid)
         roles: Mapping[str, Any] = {"value": "state", "stored": "state"}
         initial = {"value": kind.start, "next": kind.start, "stored": 1.0}
         names = ("value", "stored", "next", "diffusivity", "coefficient", "target", "missed")
         self.fields = CellFields(
             self.grid,
-            [CellField(each, "", "", "cells", roles.get(each, "scratch"), initial.get(each, 0.0)) for each in names],
+            [CellField(name, "", "", "cells", roles.get(name, "scratch"), initial.get(name, 0.0)) for name in names],
         )
         self._through = np.zeros((2, 3, *self.grid.padded_shape))
         self._faces = SideFaces.of(fluid.boundaries, sides, kind.capacity)
@@ -179,14 +179,14 @@ class Scalar:
     @property
     def capacity(self) -> float:
         """Capacity of all the fluid: rho c V [J/K], or its mass [kg]."""
-        held = self.fields.owned("stored") * self.flow.groups.volume
-        return float(self._amount * self.fluid.communicator.sum(held))
+        amount = self.fields.owned("stored") * self.flow.groups.volume
+        return float(self._amount * self.fluid.communicator.sum(amount))
 
     @property
     def content(self) -> float:
         """What the fluid holds above `kind.start`: its sum of the value times capacity [J] or [kg]."""
-        held = self.fields.owned("stored") * self.flow.groups.volume * (self.value - self.kind.start)
-        return float(self._amount * self.fluid.communicator.sum(held))
+        amount = self.fields.owned("stored") * self.flow.groups.volume * (self.value - self.kind.start)
+        return float(self._amount * self.fluid.communicator.sum(amount))
 
     @property
     def _amount(self) -> float:
@@ -196,8 +196,8 @@ class Scalar:
         """Let fluid enter or leave cells with its value, where particles leave or enter: change of voidage."""
         stored, change = self.fields.owned("stored"), self.flow.groups.averaged(change)
         stored += change
-        held = change * self.flow.groups.volume * (self.value - self.kind.start)
-        self.sums["displaced"] += float(self._amount * self.fluid.communicator.sum(held))
+        amount = change * self.flow.groups.volume * (self.value - self.kind.start)
+        self.sums["displaced"] += float(self._amount * self.fluid.communicator.sum(amount))
 
     # ------------------------------------------------------------ one step
 

@@ -124,16 +124,16 @@ class Carried(NamedTuple):
 
 
 @inline
-def entering(coefficient, outside, given, in_series, own, half):
+def entering(coefficient, outside, source, in_series, own, half):
     """What enters a cell through a wall, per area.
 
-    coefficient, outside, given, in_series  see `Carried`
+    coefficient, outside, source, in_series  see `Carried`
     own   value of the cell
     half  coefficient between the wall and the value of the cell [m/s]
     """
     if in_series != 0.0:
         coefficient = half if math.isinf(coefficient) else coefficient * half / (coefficient + half)
-    return coefficient * (outside - own) + given
+    return coefficient * (outside - own) + source
 
 
 @threaded
@@ -156,12 +156,12 @@ def carry(value, carried_by, stage, unlimited):
                 out[i] = moved - spread * (high[i] - low[i])
     for n in range(len(places)):
         axis, face, cell, inward = places[n]
-        brought, coefficient, outside, given, share, in_series = rules[n]
+        brought, coefficient, outside, source, share, in_series = rules[n]
         own, through_side = value[cell], flux[axis, face]
         enters = through_side * inward > 0.0 and not math.isnan(brought)
         through[axis, face] = through_side * (brought if enters else own)
         half = 2.0 * diffusivity[cell] * inverse[axis]
-        through[axis, face] += inward * share * entering(coefficient, outside, given, in_series, own, half)
+        through[axis, face] += inward * share * entering(coefficient, outside, source, in_series, own, half)
 
 
 @threaded

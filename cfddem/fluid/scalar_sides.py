@@ -66,7 +66,7 @@ def _brought(grid: Grid, side: Side, inlet: np.ndarray, sides: ScalarSides) -> A
     if not callable(sides.inflow):
         return sides.inflow
     at = np.broadcast_arrays(*grid.faces(side.axis))
-    return sides.inflow(side.name, *(side.layer(each, -1 if side.high else 0)[inlet] for each in at))
+    return sides.inflow(side.name, *(side.layer(coordinate, -1 if side.high else 0)[inlet] for coordinate in at))
 
 
 def _open_share(boundaries: Boundaries, side: Side) -> Any:

@@ -193,14 +193,14 @@ class FluidSolver:
         if coefficient is None:
             fields.drag.fill(0.0)
         else:
-            given = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
-            self._set_cells(fields.drag, given)
+            values = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
+            self._set_cells(fields.drag, values)
         for name, field in (("drag_momentum", momentum), ("source", source)):
             if field is None:
                 getattr(fields, name).fill(0.0)
             else:
-                given = checked_field(name, field, (*shape, 3), self.communicator)
-                self._set_cells(getattr(fields, name), np.moveaxis(given, -1, 0))
+                values = checked_field(name, field, (*shape, 3), self.communicator)
+                self._set_cells(getattr(fields, name), np.moveaxis(values, -1, 0))
 
     def _set_cells(self, padded: Array, cells: Array) -> None:
         """Write the cells of a padded field, and fill its ghosts."""
@@ -463,9 +463,9 @@ class FluidSolver:
                  the implicit drag has seen [m/s]
         """
         fields = self.fields
-        weight, seen = np.empty((2, *fields.velocity.shape))
-        drag_seen(self._balance(fields.other_velocity), fields.velocity, self._medium, self.last_step, weight, seen)
-        return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(seen), 0, -1)
+        weight, mean = np.empty((2, *fields.velocity.shape))
+        drag_seen(self._balance(fields.other_velocity), fields.velocity, self._medium, self.last_step, weight, mean)
+        return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(mean), 0, -1)
 
     def _in_cells(self, faces: Array, counted: Array) -> Array:
         """Mean over the two faces of every cell (3, nz, ny, nx).

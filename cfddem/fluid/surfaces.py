@@ -65,7 +65,7 @@ class Plane:
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`."""
         shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
-        u, v, w = (np.full(shape, each) for each in self.sliding)
+        u, v, w = (np.full(shape, speed) for speed in self.sliding)
         return u, v, w
 
 
@@ -101,7 +101,7 @@ class Turned:
 
     def _across(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """Place along the axis, and the two coordinates across, in the order that turns counter-clockwise."""
-        shifted = [each - c for each, c in zip((x, y, z), self.centre)]
+        shifted = [coordinate - c for coordinate, c in zip((x, y, z), self.centre)]
         return shifted[self.axis], shifted[(self.axis + 1) % 3], shifted[(self.axis + 2) % 3]
 
     def distance(self, x: Array, y: Array, z: Array) -> Array:
@@ -112,12 +112,12 @@ class Turned:
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: spin times the radius of the nearest point of the wall."""
         along, first, second = np.broadcast_arrays(*self._across(x, y, z))
-        made: list[Array] = [np.zeros(along.shape) for _ in range(3)]
+        components: list[Array] = [np.zeros(along.shape) for _ in range(3)]
         if self.spin != 0.0:
             radius = np.hypot(first, second)
             share = self.spin * self._nearest(along, radius)[1] / np.maximum(radius, 1e-300)
-            made[(self.axis + 1) % 3], made[(self.axis + 2) % 3] = -share * second, share * first
-        return made[0], made[1], made[2]
+            components[(self.axis + 1) % 3], components[(self.axis + 2) % 3] = -share * second, share * first
+        return components[0], components[1], components[2]
 
     def _nearest(self, along: Array, radius: Array) -> tuple[Array, Array]:
         """Signed distance from the line, and the radius of its nearest point [m]."""

@@ -41,17 +41,17 @@ class ThinWall:
         """Whether the wall crosses the straight lines between places (N, 3) [m] (N,)."""
         from cfddem.fluid.triangles_loops import crossings  # compiled, for few cases
 
-        found = np.zeros(len(begin), bool)
-        crossings(np.ascontiguousarray(begin), np.ascontiguousarray(end), self.corners, self._tree, found)
-        return found
+        crossed = np.zeros(len(begin), bool)
+        crossings(np.ascontiguousarray(begin), np.ascontiguousarray(end), self.corners, self._tree, crossed)
+        return crossed
 
     def side(self, places: Array) -> Array:
         """Distance of places (N, 3) [m] from the wall, negative on the side of its normals (N,) [m]."""
         from cfddem.fluid.triangles_loops import signed_distances
 
-        found = np.empty(len(places))
-        signed_distances(np.ascontiguousarray(places), self.corners, self._normals, self._tree, found)
-        return found
+        distance = np.empty(len(places))
+        signed_distances(np.ascontiguousarray(places), self.corners, self._normals, self._tree, distance)
+        return distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def thin_wall(*surfaces: Array) -> ThinWall:
 
     errors  InputError for triangles beside each other with opposite normals
     """
-    corners = with_area(np.concatenate([np.asarray(each, float) for each in surfaces]))
+    corners = with_area(np.concatenate([np.asarray(surface, float) for surface in surfaces]))
     if not len(corners):
         raise InputError("thin wall", None, "of at least one triangle with an area")
     names, _, count = edges_of(corners)
@@ -107,7 +107,7 @@ def parted(surface: Surface, centres: list[Array], spacing: tuple[float, ...], d
     """
     if not isinstance(surface, TwoSided):
         return np.zeros(centres[0].shape, bool)
-    here = np.stack([np.ravel(each) for each in centres], axis=-1) + ASIDE * np.array(spacing)
+    here = np.stack([np.ravel(coordinate) for coordinate in centres], axis=-1) + ASIDE * np.array(spacing)
     return surface.thin.between(here - np.eye(3)[d] * spacing[d], here).reshape(centres[0].shape)
 
 

@@ -53,10 +53,10 @@ class ClosedSurface:
         from cfddem.fluid.triangles_loops import signed_distances  # compiled, for few cases
 
         places = np.broadcast_arrays(x, y, z)
-        points = np.stack([np.ravel(each) for each in places], axis=-1).astype(float)
-        found = np.empty(len(points))
-        signed_distances(points, self.corners, self._normals, self.tree, found)
-        return found.reshape(places[0].shape)
+        points = np.stack([np.ravel(coordinate) for coordinate in places], axis=-1).astype(float)
+        distance = np.empty(len(points))
+        signed_distances(points, self.corners, self._normals, self.tree, distance)
+        return distance.reshape(places[0].shape)
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See :meth:`cfddem.fluid.surfaces.Surface.velocity`: it is at rest."""
@@ -85,7 +85,7 @@ def closed_surface(corners: Array, key: str = "surface", name: str | None = None
                              "orient them alike before you export it")  # fmt: skip
         place = np.zeros((names.max() + 1, 3))
         place[names.ravel()] = corners.reshape(-1, 3)
-        at = ", ".join(f"{each:.4g}" for each in place[of_hole[~same][0]].mean(axis=0))
+        at = ", ".join(f"{coordinate:.4g}" for coordinate in place[of_hole[~same][0]].mean(axis=0))
         raise InputError(key, name, "a closed surface, every edge between two triangles",
                          f"{int((~same).sum())} edges have not, one at ({at}) m; close the holes")  # fmt: skip
     parts = [corners[part] for part in _parts(names)]
@@ -96,13 +96,13 @@ def closed_surface(corners: Array, key: str = "surface", name: str | None = None
     if around > 1:
         remedy = f"it has {around} parts with fluid inside; reverse the triangles of what is solid within the vessel"
         raise InputError(key, name, "one vessel", remedy)
-    made = ClosedSurface(corners, names)
-    one, two = first_crossing(made.corners, made.names, made.tree)
+    surface = ClosedSurface(corners, names)
+    one, two = first_crossing(surface.corners, surface.names, surface.tree)
     if one >= 0:
-        at = ", ".join(f"{each:.4g}" for each in made.corners[two].mean(axis=0))
+        at = ", ".join(f"{coordinate:.4g}" for coordinate in surface.corners[two].mean(axis=0))
         raise InputError(key, name, "a surface that does not pass through itself",
                          f"two triangles cross near ({at}) m; unite its parts before you export it")  # fmt: skip
-    return made
+    return surface
 
 
 def with_area(corners: Array) -> Array:
@@ -179,7 +179,7 @@ def _parts(names: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     begin, after = names.ravel(), np.roll(names, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(begin)), (begin, after)), shape=(count, count))
     number, part = connected_components(graph, directed=False)
-    return [np.flatnonzero(part[names[:, 0]] == each) for each in range(number)]
+    return [np.flatnonzero(part[names[:, 0]] == piece) for piece in range(number)]
 
 
 def normals_of(corners: Array, names: NDArray[np.int64]) -> Array:
@@ -207,20 +207,20 @@ def sorted_into_boxes(corners: Array) -> tuple[NDArray[np.int64], Tree]:
     begins = [count * np.arange(2**level + 1) // 2**level for level in range(depth + 1)]
     for begin in begins[:-1]:  # halve every box across its longest edge
         node = np.repeat(np.arange(len(begin) - 1), np.diff(begin))
-        low, high = (each.reduceat(middle[order], begin[:-1]) for each in (np.minimum, np.maximum))
+        low, high = (extreme.reduceat(middle[order], begin[:-1]) for extreme in (np.minimum, np.maximum))
         across = np.argmax(high - low, axis=1)[node]
         order = order[np.lexsort((middle[order, across], node))]
     ends = corners[order].min(axis=1), corners[order].max(axis=1)
     box = np.empty((2 ** (depth + 1) - 1, 6))
     skip, first, last = np.zeros((3, len(box)), np.int64)
     for level, begin in enumerate(begins):
-        held = 2 ** (depth - level + 1) - 1  # nodes that one of this level is, and holds
+        nodes = 2 ** (depth - level + 1) - 1  # nodes that one of this level is, and holds
         at = np.zeros(1, np.int64)
         for above in range(level):
             at = (at[:, None] + 1 + np.array([0, 2 ** (depth - above) - 1])).ravel()
         box[at, :3] = np.minimum.reduceat(ends[0], begin[:-1])
         box[at, 3:] = np.maximum.reduceat(ends[1], begin[:-1])
-        skip[at] = at + held
+        skip[at] = at + nodes
         if level == depth:
             first[at], last[at] = begin[:-1], begin[1:]
     return order, Tree(box, skip, first, last)

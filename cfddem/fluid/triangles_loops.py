@@ -18,21 +18,21 @@ AT_CORNER = 1e-9
 
 
 @threaded
-def signed_distances(points, corners, normals, tree, found):
+def signed_distances(points, corners, normals, tree, distance):
     """Write the distance of points from the nearest triangle, positive on the side against its normal.
 
-    points   (N, 3) [m]
-    corners  (T, 3, 3) [m]
-    normals  (T, 7, 3) of a triangle, of its edges after corners 0, 1, 2 and of its corners
-    tree     `cfddem.fluid.triangles.Tree`
-    found    (N,) [m], written
+    points    (N, 3) [m]
+    corners   (T, 3, 3) [m]
+    normals   (T, 7, 3) of a triangle, of its edges after corners 0, 1, 2 and of its corners
+    tree      `cfddem.fluid.triangles.Tree`
+    distance  (N,) [m], written
     """
     for block in prange((len(points) + BLOCK - 1) // BLOCK):
-        _of_block(points, block * BLOCK, corners, normals, tree, found)
+        _of_block(points, block * BLOCK, corners, normals, tree, distance)
 
 
 @inline
-def _of_block(points, start, corners, normals, tree, found):
+def _of_block(points, start, corners, normals, tree, distance):
     """The distances of neighbouring points: the search for each begins at the triangle nearest to the one before."""
     nearest = 0
     for n in range(start, min(start + BLOCK, len(points))):
@@ -48,7 +48,7 @@ def _of_block(points, start, corners, normals, tree, found):
                 if square < least:
                     least, side, nearest = square, across, t
             node += 1
-        found[n] = np.copysign(np.sqrt(least), -side)
+        distance[n] = np.copysign(np.sqrt(least), -side)
 
 
 @inline
@@ -185,10 +185,10 @@ def _through(begin, way, corners, b):
 
 
 @threaded
-def crossings(begin, end, corners, tree, found):
+def crossings(begin, end, corners, tree, crossed):
     """Write whether the straight lines between places (N, 3) pass through any triangle, its edges included."""
     for n in prange(len(begin)):
-        found[n] = _is_crossed(begin, end, n, corners, tree)
+        crossed[n] = _is_crossed(begin, end, n, corners, tree)
 
 
 @inline

@@ -33,17 +33,17 @@ def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Ar
     slope = fluid.cell_pressure_gradient()  # ranks exchange values here, so all of them do, whichever sides they touch
     fluid.rates()  # brings the effective viscosity up to date
     viscosity = fluid.grid.inner(fluid.fields.effective_viscosity)
-    made = {side.name: [_on_side(fluid, side, slope, viscosity)] for side in fluid.boundaries.sides}
+    parts = {side.name: [_on_side(fluid, side, slope, viscosity)] for side in fluid.boundaries.sides}
     if fluid.grid.walls:
-        made[SMOOTH] = [force_on_walls(fluid), pressure_on_walls(fluid)]
-    found = {}
+        parts[SMOOTH] = [force_on_walls(fluid), pressure_on_walls(fluid)]
+    loads = {}
     for name in (*(side.name for side in fluid.boundaries.box.sides), *([SMOOTH] if fluid.grid.walls else [])):
         rows = np.zeros((0, 6))
-        for place, force in made.get(name, []):
+        for place, force in parts.get(name, []):
             rows = np.concatenate([rows, np.concatenate([force, np.cross(place - centre, force)], axis=1)])
         total = np.array(fluid.communicator.sum(rows, axis=0))
-        found[name] = total[:3], total[3:]
-    return found
+        loads[name] = total[:3], total[3:]
+    return loads
 
 
 def _on_side(fluid: FluidSolver, side: Side, slope: Array, viscosity: Array) -> tuple[Array, Array]:
@@ -61,7 +61,7 @@ def _on_side(fluid: FluidSolver, side: Side, slope: Array, viscosity: Array) -> 
     share = plane(side.layer(apertures, side.face(grid))) * side.layer(grid.open, end)
     here = (share > 0.0) & ~np.isin(side.owner, side.inlets) & ~plane(side.outlet)
     area, half = grid.face_area(d) * share[here], 0.5 * grid.spacing[d]
-    place = np.stack([side.layer(each, end)[here] for each in np.broadcast_arrays(*grid.faces(d))], axis=-1)
+    place = np.stack([side.layer(coordinate, end)[here] for coordinate in np.broadcast_arrays(*grid.faces(d))], axis=-1)
     pressure = side.layer(fluid.pressure, end)[here] - side.inward * half * side.layer(slope, end)[d][here]
     at_wall = side.layer(viscosity, end)[here]
     sticks = plane(side.mirror)[here] < 0.0
@@ -105,7 +105,7 @@ def pressure_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
     area = wall_area(cut).reshape(3, -1)
     here = np.flatnonzero(area.any(axis=0))
     place = _places(cut, here)
-    centre = np.stack([np.ravel(each)[here] for each in np.broadcast_arrays(*grid.centres())], axis=-1)
+    centre = np.stack([np.ravel(coordinate)[here] for coordinate in np.broadcast_arrays(*grid.centres())], axis=-1)
     slope = fluid.cell_pressure_gradient().reshape(3, -1)[:, here].T
     pressure = fluid.pressure.ravel()[here] + (slope * (place - centre)).sum(axis=1)
     return place, -pressure[:, None] * area[:, here].T
@@ -121,7 +121,7 @@ def wall_area(cut: CutCells) -> Array:
 
 def _places(cut: CutCells, here: Any) -> Array:
     """Points of the wall nearest to the centres of some cells (n, 3) [m]."""
-    return _on_wall(cut, [np.ravel(each)[here] for each in np.broadcast_arrays(*cut.grid.centres())])
+    return _on_wall(cut, [np.ravel(coordinate)[here] for coordinate in np.broadcast_arrays(*cut.grid.centres())])
 
 
 # ---------------------------------------------------------------- shear rates
@@ -130,19 +130,23 @@ def _places(cut: CutCells, here: Any) -> Array:
 def _shear(fluid: FluidSolver, cut: CutCells, here: Any, place: Array, d: int) -> Array:
     r"""Shear rate of component d, less that of a rigid body that moves with the wall, at places on it (n,) [1/s]."""
     shape = cut.volume.shape
-    k, j, i = (each.ravel() for each in np.meshgrid(*(np.arange(-2, 3 + (e == d)) for e in (2, 1, 0)), indexing="ij"))
+    k, j, i = (
+        offset.ravel() for offset in np.meshgrid(*(np.arange(-2, 3 + (e == d)) for e in (2, 1, 0)), indexing="ij")
+    )
     cells = cut.grid.inner(np.arange(cut.volume.size).reshape(shape)).ravel()[here]
     faces = cells[:, None] + (k * shape[1] + j) * shape[2] + i
-    at = [np.ravel(each) for each in cut.points([0.5 * (e != d) for e in range(3)])]
+    at = [np.ravel(coordinate) for coordinate in cut.points([0.5 * (e != d) for e in range(3)])]
     relative = fluid.fields.velocity[d].ravel() - cut.sliding[d].ravel()
     slides = np.unique(faces[(cut.sliding[d].ravel() * cut.distance[d].ravel() != 0.0)[faces]])
     if slides.size:
-        wall = _on_wall(cut, [each[slides] for each in at])
+        wall = _on_wall(cut, [coordinate[slides] for coordinate in at])
         relative[slides] -= cut.distance[d].ravel()[slides] * _turning(cut, list(wall.T))[:, d]
     rate = np.zeros(here.size)
     for begin in range(0, here.size, AT_ONCE):
         some = slice(begin, begin + AT_ONCE)
-        share = _fit(fluid, cut, faces[some], np.stack([each[faces[some]] for each in at], axis=-1), place[some], d)
+        share = _fit(
+            fluid, cut, faces[some], np.stack([coordinate[faces[some]] for coordinate in at], axis=-1), place[some], d
+        )
         rate[some] = (share * np.where(share != 0.0, relative[faces[some]], 0.0)).sum(axis=1)
     return rate
 
@@ -156,10 +160,10 @@ def _fit(fluid: FluidSolver, cut: CutCells, faces: Any, at: Array, place: Array,
     at  centres of the faces (n, m, 3) [m]
     """
     distance, depth, scale = cut.distance[d].ravel()[faces], cut.depth[d].ravel()[faces], min(cut.grid.spacing)
-    known = (distance > 0.0) & (fluid.faces.solved[d].ravel()[faces] > 0.0)
+    usable = (distance > 0.0) & (fluid.faces.solved[d].ravel()[faces] > 0.0)
     along = at - place[:, None]
     near = 1.0 - ((along / np.array(cut.grid.spacing)) ** 2).sum(axis=-1) / AROUND**2
-    weight = known * (distance * np.maximum(near, 0.0)) ** 2
+    weight = usable * (distance * np.maximum(near, 0.0)) ** 2
     normal = np.stack(_slopes(cut, list(place.T)), axis=-1)[:, None]
     along -= (along * normal).sum(axis=-1, keepdims=True) * normal
     model = np.concatenate([np.ones((*faces.shape, 1)), along / scale, depth[..., None] / scale], axis=-1)
@@ -172,7 +176,7 @@ def _turning(cut: CutCells, points: list[Array]) -> Array:
     """Change of the normal along the velocity of the wall, w.grad n at its points (n, 3) [1/s]."""
     sliding, step = cut.surface.velocity(*points), 1e-2 * min(cut.grid.spacing)
     speed = np.sqrt(sliding[0] ** 2 + sliding[1] ** 2 + sliding[2] ** 2)
-    along = [each / np.maximum(speed, 1e-300) for each in sliding]
+    along = [component / np.maximum(speed, 1e-300) for component in sliding]
     ahead, behind = (_slopes(cut, [x + side * step * n for x, n in zip(points, along)]) for side in (1.0, -1.0))
     return np.asarray((speed * (np.array(ahead) - np.array(behind)) / (2.0 * step)).T)
 
@@ -180,11 +184,11 @@ def _turning(cut: CutCells, points: list[Array]) -> Array:
 def _slopes(cut: CutCells, points: Sequence[Array]) -> list[Array]:
     """Gradient of the distance, which is the normal into the fluid."""
     step = 1e-3 * min(cut.grid.spacing)
-    made = []
+    slopes = []
     for d in range(3):
         high, low = ([x + side * step * (e == d) for e, x in enumerate(points)] for side in (1.0, -1.0))
-        made.append((cut.surface.distance(*high) - cut.surface.distance(*low)) / (2.0 * step))
-    return made
+        slopes.append((cut.surface.distance(*high) - cut.surface.distance(*low)) / (2.0 * step))
+    return slopes
 
 
 def _on_wall(cut: CutCells, points: Sequence[Array]) -> Array:

@@ -155,7 +155,7 @@ class PressureEquation:
         self._largest, self._parts = np.zeros(planes), np.zeros((planes, 3), np.int64)
 
     def _all_levels(self, grid: Grid) -> list[Level]:
-        return [Level(*each, self._outlets) for each in hierarchy(grid)]
+        return [Level(*coefficients, self._outlets) for coefficients in hierarchy(grid)]
 
     @property
     def coefficients(self) -> tuple[Array, Array, Array, Array]:

@@ -40,18 +40,18 @@ def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
         first_row, end_row = _cells_in(jc, factors[1], 0, ny)
         for ic in range(coarse_ax.shape[2]):
             first, end = _cells_in(ic, factors[0], 0, nx)
-            west = south = below = held = 0.0
+            west = south = below = anchored = 0.0
             for k in range(first_plane, end_plane):
                 for j in range(first_row, end_row):
                     west += ax[k, j, first]
                     for i in range(first, end):
                         south += ay[k, j, i] if j == first_row else 0.0
                         below += az[k, j, i] if k == first_plane else 0.0
-                        held += anchor[k, j, i]
+                        anchored += anchor[k, j, i]
             coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
             coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
             coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
-            coarse_anchor[kc, jc, ic] = held / farther
+            coarse_anchor[kc, jc, ic] = anchored / farther
 
 
 @threaded

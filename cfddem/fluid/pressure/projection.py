@@ -143,7 +143,7 @@ def balance_cell(flow, shares, fresh, equation, k, j, i):
     (nz, ny, nx), ends = flow.open_cells.shape, flow.ends
     ax, ay, az, anchor, b = equation
     kk, jj, ii = k + LOW, j + LOW, i + LOW
-    outflow, held = flow.rate[kk, jj, ii] * open_cell(shares, kk, jj, ii) * areas[0] / inverse[0], 0.0
+    outflow, anchored = flow.rate[kk, jj, ii] * open_cell(shares, kk, jj, ii) * areas[0] / inverse[0], 0.0
     here = voidage[kk, jj, ii]
     for d in range(3):
         dk, dj, di = UNIT[d]
@@ -157,10 +157,10 @@ def balance_cell(flow, shares, fresh, equation, k, j, i):
             place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
             # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
             if ends[d, 0] and place == 0:
-                held += 2.0 * a_below
+                anchored += 2.0 * a_below
                 a_below = 0.0
             if ends[d, 1] and place == cells - 1:
-                held += 2.0 * a_above
+                anchored += 2.0 * a_above
             if cells == 1:
                 a_below = 0.0
             if d == 0:
@@ -171,7 +171,7 @@ def balance_cell(flow, shares, fresh, equation, k, j, i):
                 az[k, j, i] = a_below
     b[k, j, i] = -outflow * flow.open_cells[k, j, i]
     if fresh:
-        anchor[k, j, i] = held
+        anchor[k, j, i] = anchored
 
 
 @threaded

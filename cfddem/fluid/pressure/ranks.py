@@ -64,19 +64,20 @@ class SharedLevel(Level):
         borders: Sequence[Borders],
     ) -> None:
         self.whole, self.starts, self.borders = whole, starts, borders
-        self.axes, self.communicator = [each.axis for each in borders], borders[0].communicator
-        x, y, z = (len(each) - 1 for each in starts)
+        self.axes, self.communicator = [border.axis for border in borders], borders[0].communicator
+        x, y, z = (len(begins) - 1 for begins in starts)
         place = place_of(self.communicator.rank, (x, y, z))
-        self.first = np.array([each[n] for each, n in zip(starts, place)])
-        self.stop = np.array([each[n + 1] for each, n in zip(starts, place)])
+        self.first = np.array([begins[n] for begins, n in zip(starts, place)])
+        self.stop = np.array([begins[n + 1] for begins, n in zip(starts, place)])
         self.ghosts = np.isin(range(3), self.axes).astype(np.int64)  # layers below and above along x, y, z
         shape = (self.stop - self.first + 2 * self.ghosts)[::-1].tolist()
         super().__init__((shape[0], shape[1], shape[2]), factors, outlets)
         merged = factors == 2
         self.shift[:] = merged * self.ghosts * (self.first % 2 == 0)
-        straddled = [merged[axis] and 1 in each[1:-1] % 2 for axis, each in enumerate(starts)]
-        self.straddled = [each for each in borders if straddled[each.axis]]  # a coarse cell has cells of two ranks
-        self.next_starts = [-(-each // factor) for each, factor in zip(starts, factors)]
+        straddled = [merged[axis] and 1 in begins[1:-1] % 2 for axis, begins in enumerate(starts)]
+        # a coarse cell has cells of two ranks
+        self.straddled = [border for border in borders if straddled[border.axis]]
+        self.next_starts = [-(-begins // factor) for begins, factor in zip(starts, factors)]
         self._own = self._inside(self.first, self.stop)
 
     def _inside(self, begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[slice, ...]:
@@ -90,8 +91,8 @@ class SharedLevel(Level):
 
     def fill(self, values: Array) -> None:
         """Fill the ghosts of an array of this level."""
-        for each in self.borders:
-            each.fill(values, 1, 1)
+        for border in self.borders:
+            border.fill(values, 1, 1)
 
     def without_ghosts(self, values: Array) -> None:
         """Set the ghosts of an array of this level to zero."""
@@ -124,8 +125,8 @@ class SharedLevel(Level):
         """Compute the residual; that of ghosts too, for coarse cells that hold cells of several ranks."""
         super().take_residual()
         self.without_ghosts(self.image)
-        for each in self.straddled:
-            each.fill(self.image, 1, 1)
+        for border in self.straddled:
+            border.fill(self.image, 1, 1)
 
     def gather_to(self, whole: Level, values: Array, target: Array) -> None:
         """Copy the cells of all ranks into an array of the same grid that every rank has."""
@@ -134,7 +135,7 @@ class SharedLevel(Level):
     @cached_property
     def places(self) -> NDArray[np.int64]:
         """Where the cells of all ranks, one rank after the other, lie in an array of the whole grid."""
-        x, y, z = (len(each) - 1 for each in self.starts)
+        x, y, z = (len(begins) - 1 for begins in self.starts)
         places = (place_of(rank, (x, y, z)) for rank in range(self.communicator.size))
         number = np.arange(math.prod(self.whole)).reshape(self.whole)
         return np.concatenate([number[region_of(self.starts, place)].ravel() for place in places])
@@ -172,13 +173,13 @@ class SharedPressureEquation(PressureEquation):
         """Levels of which each rank has a part, the last of them again as a whole, and the coarser ones as a whole."""
         assert isinstance(grid, Block)
         borders, shared, whole = grid.borders(self._periodic), list[SharedLevel](), list[Level]()
-        starts = [np.array(each) for each in grid.division.starts]
+        starts = [np.array(begins) for begins in grid.division.starts]
         for shape, factors in hierarchy(grid.whole):
             if not whole:
                 shared.append(SharedLevel(shape, factors, self._outlets, starts, borders))
                 starts = shared[-1].next_starts
-            too_thin = any((np.diff(each) < 1).any() for each in starts)  # local: all ranks know all starts
-            seam = any(self._periodic[each.axis] and shape[2 - each.axis] % 2 == 1 for each in borders)
+            too_thin = any((np.diff(begins) < 1).any() for begins in starts)  # local: all ranks know all starts
+            seam = any(self._periodic[border.axis] and shape[2 - border.axis] % 2 == 1 for border in borders)
             if whole or math.prod(shape) <= SMALL or too_thin or seam:
                 whole.append(Level(shape, factors, self._outlets))
         if not whole:
@@ -195,8 +196,8 @@ class SharedPressureEquation(PressureEquation):
         """See `PressureEquation.prepare`."""
         finest, coarsest, whole = self.levels[0], self.levels[self._shared - 1], self.levels[self._shared]
         assert isinstance(finest, SharedLevel) and isinstance(coarsest, SharedLevel)
-        for values, given in zip(finest.coefficients, self._given):
-            finest.own(values)[:] = given
+        for values, coefficient in zip(finest.coefficients, self._given):
+            finest.own(values)[:] = coefficient
             finest.fill(values)
         for depth, level in enumerate(self.levels):
             if depth == self._shared:
