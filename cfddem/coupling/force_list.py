@@ -46,7 +46,7 @@ class ForceList:
             raise InputError(f"lines of the force {force.name}", force.lines, f"some of {', '.join(LINES)}")
         for field in force.fields:
             particles.declare(field)
-        self._forces = sorted([*self._forces, force], key=lambda each: each.late)
+        self._forces = sorted([*self._forces, force], key=lambda force: force.late)
 
     def __iter__(self) -> Iterator[FluidForce]:
         return iter(self._forces)
@@ -109,8 +109,8 @@ def require_features(state: Mapping[str, Any], present: Collection[str]) -> None
 
 def require_unwritten(particles: Particles) -> None:
     """Refuse a change of `applied`, which belongs to the run."""
-    known = particles[APPLIED.name]
-    changed = ((particles.applied != known) & ~np.isnan(known)).any(axis=1)  # local: components of a row
+    written = particles[APPLIED.name]
+    changed = ((particles.applied != written) & ~np.isnan(written)).any(axis=1)  # local: components of a row
     if changed.any():  # local: every rank has its own particles
         name = int(particles.id[np.argmax(changed)])  # local: the first on this rank
         remedy = "write particles.external, or Simulation.add(force)"
@@ -128,7 +128,7 @@ def _replace(applied, forces, force):
     for n in prange(len(force)):
         for d in range(3):
             new = 0.0
-            for each in forces:
-                new += each[n, d]
+            for term in forces:
+                new += term[n, d]
             force[n, d] += new - applied[n, d]
             applied[n, d] = new

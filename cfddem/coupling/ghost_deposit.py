@@ -88,13 +88,13 @@ class GhostDeposit:
         boxes = bare + np.array([-self._layers, self._layers])[:, None]
         boxes = np.where(self.periodic, boxes, np.clip(boxes, 0, counts))
         self._bare, self._box = bare[:, rank], boxes[:, rank]
-        ends = [[np.array(each)[n : len(each) - 1 + n] for each in block.division.starts] for n in (0, 1)]
-        cells = np.array([np.stack(np.meshgrid(*each, indexing="ij"), -1).reshape(-1, 3) for each in ends])
+        ends = [[np.array(begins)[n : len(begins) - 1 + n] for begins in block.division.starts] for n in (0, 1)]
+        cells = np.array([np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) for axes in ends])
         around = [range(-n, n + 1) for n in np.where(self.periodic, -(-self._layers // counts), 0).tolist()]
-        shifts = [np.array(each) * counts for each in itertools.product(*around)]
+        shifts = [np.array(image) * counts for image in itertools.product(*around)]
         self._communicator = block.communicator
         self._in_box = _overlaps(self._box, cells, shifts)
-        self._in_cells = _overlaps(cells[:, rank], boxes, [-each for each in shifts])  # in the same order
+        self._in_cells = _overlaps(cells[:, rank], boxes, [-shift for shift in shifts])  # in the same order
 
     def homes(self) -> GhostOwners:
         """Homes of the cells and of the layer around them."""
@@ -162,32 +162,34 @@ class GhostDeposit:
         """
         if not isinstance(self.grid, Block):
             return fields
-        made = np.zeros((len(fields), *self.grid.shape), np.int64)
+        whole = np.zeros((len(fields), *self.grid.shape), np.int64)
         for region, values in self._given(fields, self._in_box, self._in_cells):
-            made[region] += values
-        return made
+            whole[region] += values
+        return whole
 
     def spread(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) of the rank's cells, in its box; the adjoint of `collected`."""
         if not isinstance(self.grid, Block):
             return fields
-        made = np.empty((len(fields), *self.shape))
+        in_box = np.empty((len(fields), *self.shape))
         for region, values in self._given(fields, self._in_cells, self._in_box):
-            made[region] = values
-        return made
+            in_box[region] = values
+        return in_box
 
     def _given(self, fields: np.ndarray, sent: Overlaps, got: Overlaps) -> Iterator[tuple[Region, np.ndarray]]:
         """Give other ranks what they wait for; returns what they give, region by region."""
         mine, width = self._communicator.rank, len(fields)
         outgoing = {
-            rank: np.concatenate([fields[each].reshape(-1) for each in regions]) for rank, regions in sent.items()
+            rank: np.concatenate([fields[region].reshape(-1) for region in regions]) for rank, regions in sent.items()
         }
-        sizes = {rank: [[_length(each) for each in region[1:]] for region in regions] for rank, regions in got.items()}
+        sizes = {
+            rank: [[_length(length) for length in region[1:]] for region in regions] for rank, regions in got.items()
+        }
         incoming = {
-            rank: np.empty(width * sum(map(math.prod, each)), fields.dtype)
-            for rank, each in sizes.items() if rank != mine
+            rank: np.empty(width * sum(map(math.prod, shapes)), fields.dtype)
+            for rank, shapes in sizes.items() if rank != mine
         }  # fmt: skip
-        self._communicator.swap({rank: each for rank, each in outgoing.items() if rank != mine}, incoming)
+        self._communicator.swap({rank: values for rank, values in outgoing.items() if rank != mine}, incoming)
         for rank, regions in got.items():
             values, end = incoming[rank] if rank != mine else outgoing[rank], 0
             for region, size in zip(regions, sizes[rank]):
@@ -202,14 +204,14 @@ def _overlaps(box: np.ndarray, others: np.ndarray, shifts: Iterable[np.ndarray])
     others  those of each rank (2, ranks, 3)
     shifts  where the others lie, too (3,); cells
     """
-    found: Overlaps = {}
+    overlaps: Overlaps = {}
     for shift in shifts:
         begin = np.maximum(box[0], others[0] + shift) - box[0]
         end = np.minimum(box[1], others[1] + shift) - box[0]
         for rank in np.flatnonzero((begin < end).all(axis=1)).tolist():  # local: three axes
-            x, y, z = (slice(*each) for each in zip(begin[rank].tolist(), end[rank].tolist()))
-            found.setdefault(rank, []).append((slice(None), z, y, x))
-    return found
+            x, y, z = (slice(*bounds) for bounds in zip(begin[rank].tolist(), end[rank].tolist()))
+            overlaps.setdefault(rank, []).append((slice(None), z, y, x))
+    return overlaps
 
 
 def _length(cells: slice) -> int:

@@ -159,8 +159,8 @@ class FilterKernel:
 
     def width(self, radius: Array) -> Array:
         """Standard deviation of the kernel of every particle (N,) [m]."""
-        found: Array = self.widths[self.kinds(radius)]
-        return found
+        widths: Array = self.widths[self.kinds(radius)]
+        return widths
 
     def of_each_kind(self, radius: Array) -> Iterator[tuple[int, Any]]:
         """Each kind of kernel, and the rows of its particles; all rows, as a slice, where there is one kind."""
@@ -403,7 +403,7 @@ class FilterKernel:
         """
         whole, first, cells = self.grid.whole, self.grid.first, self.grid.cells
         most = old.number * self.communicator.largest(volume, default=0.0)
-        unit, found = unit_of(most, 62), list[Array]()
+        unit, fields = unit_of(most, 62), list[Array]()
         carried = [
             np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(whole.shape)), np.int64) for axis in range(3)
         ]
@@ -415,8 +415,8 @@ class FilterKernel:
             if self.periodic[axis]:
                 ends[-1] = ends[0]
             here = [slice(low, low + n + (axis == d)) for d, (low, n) in enumerate(zip(first, cells))]
-            found.append(total[*here[::-1]] / unit)
-        return found
+            fields.append(total[*here[::-1]] / unit)
+        return fields
 
     def _add_diffused(self, flux: Array, passed: Array, axis: int) -> None:
         """Add the flux of the second stage through the faces normal to an axis: strength times difference.

@@ -82,8 +82,8 @@ def sort_into_slabs(position, origin, inverse, thickness, order, start):
     for n in range(len(position)):
         slab[n] = min(max(math.floor((position[n, 2] - origin) * inverse) // thickness, 0), slabs - 1)
         start[slab[n] + 1] += 1
-    for each in range(slabs):
-        start[each + 1] += start[each]
+    for earlier in range(slabs):
+        start[earlier + 1] += start[earlier]
     free = start[:-1].copy()
     for n in range(len(position)):
         order[free[slab[n]]] = n

@@ -54,7 +54,7 @@ class MergedCells(SingleCells):
     def __init__(self, grid: Grid, periodic: Any) -> None:
         if grid.whole is not grid:
             raise InputError("ranks", None, "1 for particles within smooth walls", "take one process, or solid cells")
-        self._cut = cut_cells_of_box(grid, tuple(bool(each) for each in periodic))
+        self._cut = cut_cells_of_box(grid, tuple(bool(axis) for axis in periodic))
         open_share = self._cut.own_volume() * grid.open
         small, self._home = large_cells(grid, open_share)
         super().__init__(replace(grid, solid=small, walls=None))
@@ -69,7 +69,7 @@ class MergedCells(SingleCells):
     def mean(self, fields: Array) -> Array:
         """See `SingleCells.mean`."""
         flat = fields.reshape(len(fields), -1) * self._open
-        sums = np.stack([np.bincount(self._home, weights=each, minlength=each.size) for each in flat])
+        sums = np.stack([np.bincount(self._home, weights=values, minlength=values.size) for values in flat])
         return np.asarray((sums[:, self._home] / self._total).reshape(fields.shape))
 
     def copied(self, fields: Array) -> Array:
@@ -83,12 +83,12 @@ class MergedCells(SingleCells):
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
         """See `SingleCells.gates`; never more than a group is open, so that sweeps stay stable."""
         total, whole = halo.padded(self._total.reshape(self.grid.shape)), super().gates(halo)
-        made = []
+        gates = []
         for axis in range(3):
             apertures = halo.padded(self.grid.inner(self._cut.aperture[axis]))
             least = np.minimum(total, np.roll(total, 1, axis=2 - axis))
-            made.append(whole[axis] * np.minimum(apertures, least))
-        return made[0], made[1], made[2]
+            gates.append(whole[axis] * np.minimum(apertures, least))
+        return gates[0], gates[1], gates[2]
 
 
 def merged_cells(grid: Grid, periodic: Any) -> SingleCells:

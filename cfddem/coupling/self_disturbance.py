@@ -75,14 +75,14 @@ class SelfDisturbance(FluidForce):
         """What every particle gathers of its own."""
         modes = particles[DISTURBANCE.name]
         left = modes.copy() if self._walls else modes
-        in_cells, seen = np.empty((2, particles.count))
+        in_cells, of_surfaces = np.empty((2, particles.count))
         for kind, rows in self._kernel.of_each_kind(cell_map.radius):
             position, volume = cell_map.position[rows], cell_map.volume[rows]
             if self._walls:
                 left[rows] *= self._walls[kind].left(position)
             in_cells[rows] = self._in_cells[kind].of(position, volume)
-            seen[rows] = self._seen[kind].of(position, volume) if self._seen else in_cells[rows]
-        return Own(left, in_cells, seen)
+            of_surfaces[rows] = self._seen[kind].of(position, volume) if self._seen else in_cells[rows]
+        return Own(left, in_cells, of_surfaces)
 
     def end(self, terms: CouplingTerms) -> None:
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""

@@ -155,9 +155,9 @@ def solid_beside(axis: int, spacing: tuple[float, ...], strength: tuple[float, .
     across, normal = [d for d in range(3) if d != axis], _Normal(int(counts[axis]), spacing[axis], True)
     solid = np.zeros(len(normal.weights))
     for _, squares, weight in _waves_along(across, counts, spacing):
-        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * each for each, e in zip(squares, across))
-        given = normal.smoothed(smoothing, strength[axis], sweeps)
-        solid += weight * (given * normal.weights).sum(axis=1)  # local: of a table
+        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * square for square, e in zip(squares, across))
+        modes = normal.smoothed(smoothing, strength[axis], sweeps)
+        solid += weight * (modes * normal.weights).sum(axis=1)  # local: of a table
     return solid / _alone(solid_table(spacing, strength, sweeps), len(solid), axis)
 
 
@@ -197,19 +197,19 @@ def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tu
 
     for waves, squares, weight in _waves_along(across, counts, spacing):
         square = sum(squares)
-        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * each for each, e in zip(squares, across))
-        given = normal.smoothed(smoothing, strength[axis], sweeps)
+        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * square for square, e in zip(squares, across))
+        modes = normal.smoothed(smoothing, strength[axis], sweeps)
         if square > 0.0:
             rates, stream = normal.stokes(square)
-            add(axis, math.sqrt(square) * given @ normal.mean @ stream, rates, weight)
-            lengthwise = given @ normal.slope @ stream
+            add(axis, math.sqrt(square) * modes @ normal.mean @ stream, rates, weight)
+            lengthwise = modes @ normal.slope @ stream
         for d, wave, along in zip(across, waves, squares):
             share, staggered = along / square if square > 0.0 else 0.0, weight * math.cos(0.5 * wave) ** 2
             if square > 0.0:
                 add(d, lengthwise, rates, staggered * share)
             apart = normal.rates + square
             moving = apart > 1e-9 * ends[0]  # all but the fluid as a whole, over a wall without friction
-            add(d, (given @ normal.vectors)[:, moving], apart[moving], staggered * (1.0 - share))
+            add(d, (modes @ normal.vectors)[:, moving], apart[moving], staggered * (1.0 - share))
     shares: Array = flow / np.moveaxis(_alone(free.flow, len(flow), axis), 1, 2)
     return shares
 
@@ -219,8 +219,8 @@ def _alone(table: Array, places: int, axis: int) -> Array:
     place = np.arange(places) / PLACES - 0.5
     part = place - np.floor(place)
     near, far = table[..., 0, 0, 0], np.moveaxis(table, -1 - axis, -3)[..., 1, 0, 0]
-    made: Array = near + np.multiply.outer(2.0 * part * (1.0 - part), far - near)
-    return made
+    blend: Array = near + np.multiply.outer(2.0 * part * (1.0 - part), far - near)
+    return blend
 
 
 class _Normal:

@@ -116,7 +116,7 @@ class ForceTerms:
 
     def force(self, line: str) -> Array:
         """Force of a line on every particle (N, 3) [N]; zero for a line that the run lacks."""
-        parts = [each[line] for each in (self.implicit_force, self.explicit) if line in each]
+        parts = [forces[line] for forces in (self.implicit_force, self.explicit) if line in forces]
         return sum(parts[1:], parts[0]) if parts else np.zeros((self.particles.count, 3))
 
     @property

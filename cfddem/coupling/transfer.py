@@ -119,7 +119,7 @@ class Transfer:
         weight  W: the cell has given W h (b* v* - b* u) per volume (nz, ny, nx, m) [-]
         seen    u, the value of the fluid in its implicit step (nz, ny, nx, m)
         """
-        fields = np.concatenate([np.moveaxis(each, -1, 0) for each in (weight, weight * seen)])
+        fields = np.concatenate([np.moveaxis(field, -1, 0) for field in (weight, weight * seen)])
         return self.receive(particles, sent, self.kernel.sample(cell_map.stencil, cell_map.radius, fields))
 
     def receive(self, particles: Particles, sent: ImplicitCoefficients, gathered: Array) -> Array:
@@ -190,27 +190,27 @@ def implicit_coefficients(
 
 
 @threaded
-def _implicit_coefficients(conductance, capacity, value, disturbance, last, step, found):
-    """Write b*, v*, and what each particle deposits, as found.
+def _implicit_coefficients(conductance, capacity, value, disturbance, last, step, coefficients):
+    """Write b*, v*, and what each particle deposits, as coefficients.
 
     f is the change of the quantity over the last step, less what the transfer gave, per time; held values change
     nothing.
     """
     for n in prange(len(conductance)):
-        _implicit_one(n, conductance, capacity, value, disturbance, last, step, found)
+        _implicit_one(n, conductance, capacity, value, disturbance, last, step, coefficients)
 
 
 @inline
-def _implicit_one(n, conductance, capacity, value, disturbance, last, step, found):
+def _implicit_one(n, conductance, capacity, value, disturbance, last, step, coefficients):
     """`_implicit_coefficients` of one particle."""
-    (before, received, last_step), (implicit, target, carried) = last, found
-    inverse, held = 1.0 / capacity[n], not math.isfinite(capacity[n])
+    (before, received, last_step), (implicit, target, carried) = last, coefficients
+    inverse, is_fixed = 1.0 / capacity[n], not math.isfinite(capacity[n])
     stiffness = step * conductance[n] * inverse
     theta = implicitness(stiffness)
     implicit[n] = conductance[n] / (1.0 + theta * stiffness)
     carried[n, 0] = implicit[n]
     for d in range(value.shape[1]):
-        gained = 0.0 if held else capacity[n] * (value[n, d] - before[n, d])
+        gained = 0.0 if is_fixed else capacity[n] * (value[n, d] - before[n, d])
         other = (gained - received[n, d]) / last_step
         target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other
         carried[n, 1 + d] = implicit[n] * target[n, d]

@@ -46,7 +46,10 @@ class TwoSides(OneSide):
     def __init__(self, grid: Grid, cells: Grid, homes: GhostOwners, axes: Axes) -> None:
         self._thin: ThinWall = grid.walls.thin
         spacing = np.array(grid.spacing)
-        centres = np.stack([np.ravel(each) for each in np.broadcast_arrays(*grid.centres())], axis=-1) + ASIDE * spacing
+        centres = (
+            np.stack([np.ravel(coordinate) for coordinate in np.broadcast_arrays(*grid.centres())], axis=-1)
+            + ASIDE * spacing
+        )
         away, is_open = self._thin.side(centres), cells.open.ravel()
         near = np.flatnonzero(np.abs(away) < BESIDE * spacing.max())
         of_side = []
@@ -55,8 +58,8 @@ class TwoSides(OneSide):
             home = np.arange(away.size)
             if mine.any():
                 nearest = distance_transform_edt(~mine, sampling=grid.spacing[::-1], return_indices=True)[1]
-                found = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()[near]
-                home[near] = np.where(self._thin.between(centres[near], centres[found]), found, near)
+                nearest_cells = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()[near]
+                home[near] = np.where(self._thin.between(centres[near], centres[nearest_cells]), nearest_cells, near)
             of_side.append(home[homes.of_layered])
         both = np.concatenate(of_side)
         order = np.argsort(both, kind="stable")

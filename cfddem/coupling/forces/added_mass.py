@@ -169,9 +169,9 @@ class AddedMass(FluidForce):
         deferred  of `deferred_momentum`, before C has changed (N, 3) [N s]
         weight    of `newest_weight` (N,) [-]
         """
-        given: Array = weight[:, None] * deferred
-        particles.added_momentum[:] = deferred - given
-        return given
+        momentum: Array = weight[:, None] * deferred
+        particles.added_momentum[:] = deferred - momentum
+        return momentum
 
     mass = staticmethod(added_mass)
 

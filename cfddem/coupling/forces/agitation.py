@@ -102,10 +102,10 @@ class Agitation(FluidForce):
         share = 1.0 / np.asarray(terms.flow.narrowing)  # a fluctuation is one between the particles, not of the cells
         drag = terms.conductance("drag") * share
         around = Neighbourhood(terms.cell_map, terms.flow, self._mean_slip, drag, terms.solid)
-        made = self.terms(terms.particles, around, terms.step)
-        terms.fluctuate("drag", share.reshape(-1, 1) * made.velocity)
+        agitation = self.terms(terms.particles, around, terms.step)
+        terms.fluctuate("drag", share.reshape(-1, 1) * agitation.velocity)
         if self.pushes:
-            terms.between("agitation", made.force)
+            terms.between("agitation", agitation.force)
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """What a model adds to the coming fluid step [s]."""
@@ -208,13 +208,13 @@ class PseudoTurbulence(Agitation):
         velocity = without_mean(self.kernel, around.cell_map, around.conductance, fluctuation[0])
         return AgitationTerms(velocity, self._inertial_force(particles, around, fluctuation[1], step))
 
-    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array:
+    def _inertial_force(self, particles: Particles, around: Neighbourhood, velocity: Array, step: float) -> Array:
         """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
         if not self.pushes:
-            return np.zeros_like(seen)
-        change = seen - particles[FLUCTUATION.name]
+            return np.zeros_like(velocity)
+        change = velocity - particles[FLUCTUATION.name]
         change[np.isnan(change)] = 0.0  # of inserted particles
-        particles[FLUCTUATION.name][:] = seen
+        particles[FLUCTUATION.name][:] = velocity
         mass, displaced = particles.mass, self.fluid.density * around.cell_map.volume
         coefficient = self.added_mass.coefficient(around.flow.voidage)
         with np.errstate(divide="ignore"):
@@ -295,9 +295,9 @@ def _advanced(value, rate, transition, first, second):
 
 
 @inline
-def _slip_numbers(seen, n):
+def _slip_numbers(around, n):
     """Size of the mean slip, its direction, and its Reynolds number."""
-    slip, voidage, radius, viscosity, density = seen
+    slip, voidage, radius, viscosity, density = around
     size = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
     inverse = 1.0 / max(size, 1e-300)
     direction = (slip[n, 0] * inverse, slip[n, 1] * inverse, slip[n, 2] * inverse)
@@ -311,19 +311,19 @@ def _along(process, n, direction):
 
 
 @threaded
-def _fluctuate(process, draws, seen, ratio, factors, step, ranges, fluctuation):
+def _fluctuate(process, draws, around, ratio, factors, step, ranges, fluctuation):
     """Advance the process of every particle and give it the variance of the law; returns how many are out of range.
 
     ratio        density of the particle over that of the fluid
     ranges       of the law, low and high of each argument (4, 2)
     fluctuation  with the factors of the drag, and without them (2, N, 3)
     """
-    names, radius, voidage = draws.names, seen.radius, seen.voidage
+    names, radius, voidage = draws.names, around.radius, around.voidage
     outside = 0
     for n in prange(len(names)):
         a, b, c, d = normal_numbers(draws.seed, names[n], draws.step, 0)
         e, f, _, _ = normal_numbers(draws.seed, names[n], draws.step, 1)
-        size, direction, reynolds = _slip_numbers(seen, n)
+        size, direction, reynolds = _slip_numbers(around, n)
         if math.isnan(process[n, 0]):
             process[n, 0], process[n, 1], process[n, 2] = a, b, c
             process[n, 3], process[n, 4], process[n, 5] = d, e, f
@@ -348,17 +348,17 @@ def _fluctuate(process, draws, seen, ratio, factors, step, ranges, fluctuation):
 
 
 @threaded
-def _fluctuate_force(process, draws, seen, temperature, factors, step, fitted, force):
+def _fluctuate_force(process, draws, around, temperature, factors, step, fitted, force):
     """Advance the process of every particle, exactly for a constant rate, and give it the deviation of the force.
 
     returns  how many are out of the range of solid fractions that the law is fitted to
     """
-    names, voidage, viscosity = draws.names, seen.voidage, seen.viscosity
+    names, voidage, viscosity = draws.names, around.voidage, around.viscosity
     outside = 0
     for n in prange(len(names)):
         a, b, c, _ = normal_numbers(draws.seed, names[n], draws.step, 0)
-        size, direction, reynolds = _slip_numbers(seen, n)
-        solid, diameter = 1.0 - voidage[n], 2.0 * seen.radius[n]
+        size, direction, reynolds = _slip_numbers(around, n)
+        solid, diameter = 1.0 - voidage[n], 2.0 * around.radius[n]
         kept = 0.0
         if not math.isnan(process[n, 0]):
             kept = math.exp(-step * force_rate(solid, diameter, temperature[n]))

@@ -84,8 +84,8 @@ class Drag(FluidForce):
         drag = self._alone[:, None] * slip
         density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
         in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
-        seen = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen.averaged(drag / volume)
-        rest = volume * (seen - flow.company[:, None] * in_cells)
+        in_solids = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen.averaged(drag / volume)
+        rest = volume * (in_solids - flow.company[:, None] * in_cells)
         terms.push("drag", rest)
         terms.particles[OWED.name][:] = terms.step * rest
 

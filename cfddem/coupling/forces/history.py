@@ -110,9 +110,9 @@ class History(FluidForce):
 
     def act(self, terms: ForceTerms) -> None:
         """Resist the newest change of the slip; the memory of the others pushes."""
-        made = self.terms(terms.particles, terms.flow, terms.resistance, terms.inertia, terms.step, terms.last_step)
-        terms.resist("history", made.conductance)
-        terms.between("history", made.force)
+        history = self.terms(terms.particles, terms.flow, terms.resistance, terms.inertia, terms.step, terms.last_step)
+        terms.resist("history", history.conductance)
+        terms.between("history", history.force)
 
     def end(self, terms: ForceTerms) -> None:
         """Store the impulse of the implicit part."""
@@ -132,9 +132,9 @@ class History(FluidForce):
             self._terms = _room(particles.count)
         terms = self._terms
         voidage = flow.voidage if self.model == "B" else flow.voidage[:0]
-        seen = Seen(flow.slip, voidage, particles.radius, particles.viscosity, float(self.density))
+        flow_seen = Seen(flow.slip, voidage, particles.radius, particles.viscosity, float(self.density))
         memory = Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms)
-        self._advance(seen, drag, inertia, self._kernel, float(step), float(last_step), memory)
+        self._advance(flow_seen, drag, inertia, self._kernel, float(step), float(last_step), memory)
         return terms
 
     def store(self, particles: Particles, implicit: Array, terms: HistoryTerms, step: float) -> None:

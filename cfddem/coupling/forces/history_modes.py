@@ -114,8 +114,8 @@ def implicit_part(drag, growth, time):
     rest = 1.0 - time * force
     both = 4.0 * force / (rest + math.sqrt(rest * rest + 8.0 * time * force))
     conductance = max(both - drag, 0.0)
-    given = conductance * force  # over both: theta of the transfer is force/both
-    return conductance, growth * both / given if given > 0.0 else 1.0
+    product = conductance * force  # over both: theta of the transfer is force/both
+    return conductance, growth * both / product if product > 0.0 else 1.0
 
 
 _MANTISSA, _UNIT = np.int64(52 - ROW_BITS), 2.0 ** (ROW_BITS - 52)
@@ -178,27 +178,27 @@ PIECE = 512
 
 
 @threaded
-def advance(seen, drag, inertia, kernel, step, last_step, memory):
+def advance(flow, drag, inertia, kernel, step, last_step, memory):
     """Advance the memory of every particle over the last step, and find its force in the coming one.
 
-    seen     by the inverse of whose voidage the force is larger
+    flow     by the inverse of whose voidage the force is larger
     drag     conductance (N,) [kg/s]
     inertia  (N,) [kg]
     memory   `Memory`, all of it filled but `newest`
     """
-    slip, voidage, radius, viscosity, density = seen
+    slip, voidage, radius, viscosity, density = flow
     count = len(radius)
     for piece in prange((count + PIECE - 1) // PIECE):
         begin, end = piece * PIECE, min((piece + 1) * PIECE, count)
         here = slice(begin, end)
         room = np.empty((4, end - begin))
-        found = Scales(room[0], room[1], np.empty(end - begin, np.int64), room[2], room[3])
-        _times(slip[here], radius[here], viscosity[here], voidage[here], density, step, found.time, found.stokes)
-        _growths(found.time, found.stokes, kernel.second, step, found.row, found.part, found.growth)
-        _implicit_parts(drag[here], inertia[here], found.growth, step, memory.conductance[here], memory.factor[here])
+        scales = Scales(room[0], room[1], np.empty(end - begin, np.int64), room[2], room[3])
+        _times(slip[here], radius[here], viscosity[here], voidage[here], density, step, scales.time, scales.stokes)
+        _growths(scales.time, scales.stokes, kernel.second, step, scales.row, scales.part, scales.growth)
+        _implicit_parts(drag[here], inertia[here], scales.growth, step, memory.conductance[here], memory.factor[here])
         for n in range(begin, end):
             # in a function: the compiler drops what a parallel loop itself writes through the members of a tuple
-            _remember_one(memory, slip, found, kernel, step, last_step, n, n - begin)
+            _remember_one(memory, slip, scales, kernel, step, last_step, n, n - begin)
 
 
 @vector_part
@@ -229,16 +229,16 @@ def _implicit_parts(drag, inertia, growth, step, conductance, factor):
 
 
 @inline
-def _remember_one(memory, slips, found, kernel, step, last_step, n, place):
+def _remember_one(memory, slips, scales, kernel, step, last_step, n, place):
     """Advance the modes of one particle, and find its explicit force.
 
-    place  of the particle in `found`
+    place  of the particle in `scales`
     """
     slip, before = of_row(slips, n), of_row(memory.before, n)
     past, missing = NOTHING, NOTHING
     if last_step > 0.0 and not math.isnan(before[0]):
-        time, stokes, growth_last = found.time[place], found.stokes[place], found.growth[place]
-        change, now = minus(slip, before), Place(found.row[place], found.part[place])
+        time, stokes, growth_last = scales.time[place], scales.stokes[place], scales.growth[place]
+        change, now = minus(slip, before), Place(scales.row[place], scales.part[place])
         last = now
         if last_step != step:
             row, part = _row(last_step / time)
