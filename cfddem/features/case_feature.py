@@ -56,9 +56,13 @@ class CaseFeature(Equipment):
     @classmethod
     def columns(cls, case: Case) -> Mapping[str, Quantity]:
         """Columns of the history that it gives, by name."""
-        return {each.name: Quantity(each.unit, each.meaning, each.group) for each in cls.measures if each.when(case)}
+        return {
+            measure.name: Quantity(measure.unit, measure.meaning, measure.group)
+            for measure in cls.measures
+            if measure.when(case)
+        }
 
     def values(self, simulation: Any) -> Mapping[str, float]:
         """Numbers for its columns."""
-        shown = (each for each in self.measures if each.when(simulation.case))
-        return {each.name: float(each.value(self, simulation)) for each in shown}
+        shown = (measure for measure in self.measures if measure.when(simulation.case))
+        return {measure.name: float(measure.value(self, simulation)) for measure in shown}

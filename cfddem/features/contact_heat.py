@@ -87,7 +87,7 @@ class HeatExchangeOfContacts(CaseFeature):
 
     def _reach(self, particles: Particles, communicator: Communicator) -> float:
         """Reach of the list of pairs over R* [-]."""
-        if self.choices.gap == NONE and not any(each.coefficient for each in self.walls):
+        if self.choices.gap == NONE and not any(wall.coefficient for wall in self.walls):
             return 0.0
         largest, smallest = communicator.largest(particles.radius), communicator.smallest(particles.radius)
         return float(self.keys.lens * (1.0 + largest / smallest))
@@ -126,32 +126,32 @@ class HeatExchangeOfContacts(CaseFeature):
         capacity, start = self.capacity(particles), particles.temperature.copy()
         pairs, (body, wall, at_wall) = self._links(solver)
         area = 4.0 * np.pi * particles.radius**2
-        seen = self._surroundings(simulation)
+        around = self._surroundings(simulation)
         emissivity: Any = self.emissivities[particles.material]
-        radiation = area * radiation_coefficient(emissivity, start, seen)  # type: ignore[arg-type]  # of every particle
-        temperatures = np.array([each.fixed for each in self.walls])
-        powered = np.array([each.is_powered for each in self.walls], bool)
+        radiation = area * radiation_coefficient(emissivity, start, around)  # type: ignore[arg-type]  # of every particle
+        temperatures = np.array([wall.fixed for wall in self.walls])
+        powered = np.array([wall.is_powered for wall in self.walls], bool)
 
         # walls of a temperature stand on the right; a wall with a power is an unknown without capacity
         fixed, free = ~powered[wall], powered[wall]
-        diagonal, right = capacity / step + radiation, capacity / step * start + radiation * seen
+        diagonal, right = capacity / step + radiation, capacity / step * start + radiation * around
         np.add.at(diagonal, body[fixed], at_wall[fixed])
         np.add.at(right, body[fixed], at_wall[fixed] * temperatures[wall[fixed]])
-        power = np.array([each.power for each in self.walls if each.is_powered], float)  # type: ignore[type-var]
+        power = np.array([wall.power for wall in self.walls if wall.is_powered], float)  # type: ignore[type-var]
         node = (np.cumsum(powered) - 1)[wall[free]]  # local: walls
         network = Network(solver, diagonal, pairs, (body[free], node, at_wall[free]), len(power))
         new, of_walls = network.solved(np.append(right, power), start)
 
         heat = step * pairs.link * (network.around(new)[pairs.other] - new[pairs.row])
         of_power = step * at_wall[free] * (of_walls[node] - new[body[free]])
-        given = step * at_wall[fixed] * (temperatures[wall[fixed]] - new[body[fixed]])
-        absorbed = step * radiation * (seen - new)
+        from_walls = step * at_wall[fixed] * (temperatures[wall[fixed]] - new[body[fixed]])
+        absorbed = step * radiation * (around - new)
         passed = pairs.sums(heat, count)
         np.add.at(passed, body[free], of_power)
-        np.add.at(passed, body[fixed], given)
+        np.add.at(passed, body[fixed], from_walls)
         particles.temperature += (passed + absorbed) / capacity
 
-        at_walls = total(np.append(of_power, given)), total(np.abs(np.append(of_power, given)))
+        at_walls = total(np.append(of_power, from_walls)), total(np.abs(np.append(of_power, from_walls)))
         gained = capacity * (particles.temperature - start)
         radiated, gains, size = total([absorbed, gained, np.abs(absorbed)], axis=1).tolist()
         self.from_walls += at_walls[0]
@@ -175,7 +175,7 @@ class HeatExchangeOfContacts(CaseFeature):
         order = np.lexsort((gap[pairs:], wall, body))
         fresh = np.ones(len(order), bool)
         fresh[1:] = (np.diff(body[order]) != 0) | (np.diff(wall[order]) != 0)
-        heated = np.array([each.passes_heat for each in self.walls], bool)
+        heated = np.array([wall.passes_heat for wall in self.walls], bool)
         rows = order[fresh]
         rows = rows[heated[wall[rows]] & (body[rows] < particles.owned)]
         body, wall, gap, force = body[rows], wall[rows], gap[pairs:][rows], force[pairs:][rows]
@@ -184,7 +184,7 @@ class HeatExchangeOfContacts(CaseFeature):
             particles, particles.material[body], walls.material[piece[rows]],
             (radius, np.full(len(rows), np.inf), gap, force), solver,
         )  # fmt: skip
-        coefficient = np.array([each.coefficient or 0.0 for each in self.walls])[wall]
+        coefficient = np.array([wall.coefficient or 0.0 for wall in self.walls])[wall]
         touches = np.where(gap < keys.lens * radius, coefficient * np.pi * radius**2, 0.0)
         at_wall = np.where(coefficient > 0.0, touches, at_wall)
         there = at_wall > 0.0
@@ -232,9 +232,9 @@ class HeatExchangeOfContacts(CaseFeature):
     def _surroundings(self, simulation: Any) -> np.ndarray:
         """Temperature of what every particle sees (N,) [K]."""
         particles, joined = simulation.owned, simulation.communicator.joined
-        seen = np.full(particles.count, self.keys.surroundings_temperature or 0.0)
+        temperature = np.full(particles.count, self.keys.surroundings_temperature or 0.0)
         if self.keys.surroundings == "uniform" or not self.keys.emissivity:
-            return seen
+            return temperature
         size = np.array(self.case.column.size)
         cell = np.broadcast_to(np.array(self.case.column.cell, float), 3)
         number = np.maximum(np.rint(size / cell), 1).astype(np.int64)
@@ -243,10 +243,10 @@ class HeatExchangeOfContacts(CaseFeature):
         cells = int(np.prod(number))
         # of all ranks, by id, so that sums have the same bits on any number of them
         order = np.argsort(joined(particles.id))
-        every, volume, values = (joined(each)[order] for each in (row, particles.volume, particles.temperature))
+        every, volume, values = (joined(column)[order] for column in (row, particles.volume, particles.temperature))
         voidage = 1.0 - np.minimum(np.bincount(every, volume, cells) / np.prod(size / number), 1.0)
         mean = np.bincount(every, values, cells) / np.maximum(np.bincount(every, minlength=cells), 1)
-        return np.asarray(local_surroundings(voidage[row], seen, mean[row]))  # type: ignore[arg-type]
+        return np.asarray(local_surroundings(voidage[row], temperature, mean[row]))  # type: ignore[arg-type]
 
 
 def _capacities(case: Case, keys: ContactHeat) -> np.ndarray:

@@ -51,8 +51,8 @@ class WallHeat(Checked):
     @model_validator(mode="after")
     def _one_condition(self) -> WallHeat:
         if bool(self.temperature) == self.is_powered:
-            found = "found both" if self.is_powered else "found none"
-            raise InputError("temperature", self.temperature, "given, or power, and only one of them", found)
+            how_many = "found both" if self.is_powered else "found none"
+            raise InputError("temperature", self.temperature, "given, or power, and only one of them", how_many)
         return self
 
 
@@ -132,15 +132,15 @@ class ContactHeat(FeatureTable):
                     raise InputError(f"contact_heat.{table}.{name}", value, nearest(name, list(case.material)))
                 if table == "emissivity" and value > 1.0:
                     raise InputError(f"contact_heat.emissivity.{name}", value, "0 to 1", "1 is a black body")
-        known = wall_names(case)
+        names = wall_names(case)
         for name in self.wall:
-            if name not in known:
-                raise InputError(f"contact_heat.wall.{name}", None, nearest(name, known))
+            if name not in names:
+                raise InputError(f"contact_heat.wall.{name}", None, nearest(name, names))
         self._refuse_incomplete(case)
         self._refuse_temperatures(case)
 
     def _refuse_incomplete(self, case: Any) -> None:
-        used = sorted({case.material_name_of(each) for each in case.species.values()})
+        used = sorted({case.material_name_of(species) for species in case.species.values()})
         with_walls = sorted({*used, *(material_of_wall(case, name) for name in self.wall)})
         conducts = self.contact != "none" or self.gap == "rarefied"
         heated = [name for name in self.wall if not self.wall[name].coefficient]
@@ -168,20 +168,20 @@ class ContactHeat(FeatureTable):
             raise InputError("bed.fixed", True, "false with conduction through contacts", remedy)
 
     def _refuse_temperatures(self, case: Any) -> None:
-        given = self.particle_temperature
+        temperature = self.particle_temperature
         if Heat.of(case):
-            if given is not None:
+            if temperature is not None:
                 remedy = "it has heat.particle_temperature"
                 raise InputError("contact_heat.particle_temperature", None, "left out with [heat]", remedy)
             return
-        if given is None:
+        if temperature is None:
             raise InputError("contact_heat.particle_temperature", None, "given, or [heat]", "[K]")
-        by_name = given if isinstance(given, dict) else {}
+        by_name = temperature if isinstance(temperature, dict) else {}
         for name, value in by_name.items():
             if name not in case.species:
                 raise InputError(f"contact_heat.particle_temperature.{name}", value, nearest(name, list(case.species)))
         for name in case.species:
-            value = by_name.get(name, math.nan) if isinstance(given, dict) else given
+            value = by_name.get(name, math.nan) if isinstance(temperature, dict) else temperature
             if math.isnan(value):
                 raise InputError(f"contact_heat.particle_temperature.{name}", None, "given for every species", "[K]")
             if value < 0.0:
@@ -190,14 +190,14 @@ class ContactHeat(FeatureTable):
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Tell what the exchange cannot see."""
-        if self.radius == "overlap_circle" and any(each.contact_modulus for each in case.material.values()):
+        if self.radius == "overlap_circle" and any(material.contact_modulus for material in case.material.values()):
             reason = "contacts are softened by contact_modulus, and the circle of intersection grows with it"
             yield "warning", "contact_heat.radius", reason, 'take radius = "hertz", which uses youngs_modulus'
 
     def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle in a fluid has no single temperature."""
         if heat := Heat.of(case):
-            others = {name: each for name, each in self.conductivity.items() if name not in heat.solid_conductivity}
+            others = {name: value for name, value in self.conductivity.items() if name not in heat.solid_conductivity}
             yield from heat.issues_of_biot(case, bed, "contact_heat.conductivity", others)
 
     def by_material(self, case: Any, table: str, other: float = np.nan) -> np.ndarray:
@@ -206,8 +206,10 @@ class ContactHeat(FeatureTable):
 
     def start_temperatures(self, case: Any) -> np.ndarray:
         """Temperature of new particles by number of species [K]."""
-        given = self.particle_temperature
-        return np.array([given[name] if isinstance(given, dict) else given for name in case.species], float)
+        temperature = self.particle_temperature
+        return np.array(
+            [temperature[name] if isinstance(temperature, dict) else temperature for name in case.species], float
+        )
 
     @property
     def jump(self) -> float:

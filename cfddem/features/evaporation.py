@@ -263,8 +263,8 @@ class Menisci:
         _, place = np.unique(sent[:, :2], axis=0, return_inverse=True)
         sums = np.zeros((len(sent), 2))
         np.add.at(sums, place.ravel(), sent[:, 2:])  # one of two parts is zero
-        known = {(one, other): sums[row] for (one, other), row in zip(sent[:, :2].tolist(), place.ravel().tolist())}
+        portions = {(one, other): sums[row] for (one, other), row in zip(sent[:, :2].tolist(), place.ravel().tolist())}
         halves = halves.copy()
         for row in np.flatnonzero(shared):
-            halves[row] = known[tuple(names[row].astype(float).tolist())]
+            halves[row] = portions[tuple(names[row].astype(float).tolist())]
         return halves

@@ -132,13 +132,13 @@ class Evaporation(FeatureTable):
 
     def _refuse_humidity(self, case: Any) -> None:
         """Refuse two humidities, or none; with `[vapour]` the humidity is that of the cells."""
-        given = [key for key in ("vapour_fraction", "relative_humidity") if getattr(self, key) is not None]
+        keys = [key for key in ("vapour_fraction", "relative_humidity") if getattr(self, key) is not None]
         if VapourTable.of(case):
-            for key in given:
+            for key in keys:
                 remedy = "[vapour] has the fraction in the cells"
                 raise InputError(f"evaporation.{key}", getattr(self, key), "left out with [vapour]", remedy)
-        elif len(given) != 1:
-            remedy = f"or relative_humidity, and only one of them; found {'both' if given else 'none'}"
+        elif len(keys) != 1:
+            remedy = f"or relative_humidity, and only one of them; found {'both' if keys else 'none'}"
             raise InputError("evaporation.vapour_fraction", self.vapour_fraction, "given", remedy)
 
     def partial_pressure(self, case: Any) -> float:
@@ -216,7 +216,7 @@ class Evaporation(FeatureTable):
         schmidt = fluid.viscosity / (fluid.density * self.diffusivity_in(case))
         brought = vapour_fraction(self.partial_pressure(case), self.pressure)
         saturation = wet_bulb_temperature(heat.gas_temperature, brought, self.pressure, 1.0 / heat.fluid_heat_capacity)
-        lengths = sum(case.counts[name] * math.pi * each.diameter for name, each in case.species.items())
+        lengths = sum(case.counts[name] * math.pi * species.diameter for name, species in case.species.items())
         surface = lengths * transfer_number(case, bed, schmidt) * fluid.viscosity / schmidt
         carried = flow * self._drive(saturation, brought)
         reached = -math.expm1(-surface / flow) if flow > 0.0 else math.nan
@@ -233,17 +233,17 @@ class Evaporation(FeatureTable):
 
     def _drive(self, temperature: float, brought: float) -> float:
         """Vapour that air takes up until it is saturated, over its mass [-]."""
-        held = vapour_fraction(min(saturation_pressure(temperature), 0.999 * self.pressure), self.pressure)
-        return (held - brought) / (1.0 - held)
+        at_surface = vapour_fraction(min(saturation_pressure(temperature), 0.999 * self.pressure), self.pressure)
+        return (at_surface - brought) / (1.0 - at_surface)
 
     def _at_start(self, case: Any) -> float:
         """Mass of water at the start, in drops and films [kg]."""
         total = 0.0
-        for name, each in case.species.items():
-            if case.material_name_of(each) in self.drops:
-                total += case.volumes[name] * case.material_of(each).density
+        for name, species in case.species.items():
+            if case.material_name_of(species) in self.drops:
+                total += case.volumes[name] * case.material_of(species).density
             elif case.liquid:
-                radius = np.array([0.5 * each.mean_power(3) ** (1.0 / 3.0)])
+                radius = np.array([0.5 * species.mean_power(3) ** (1.0 / 3.0)])
                 film = float(case.liquid.volume_on(radius)[0]) * case.liquid.share_of_wet_particles
                 total += case.counts[name] * film * self.liquid_density
         return float(total)

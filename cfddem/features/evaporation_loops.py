@@ -112,17 +112,17 @@ def taken_from(body, parts, masses, area, lost, taken):
 
     lost  of every particle (count,) [kg]
     """
-    given, left = np.zeros(len(lost)), np.zeros(len(lost))
+    summed, left = np.zeros(len(lost)), np.zeros(len(lost))
     for k in range(len(body)):
         i = body[k]
         if i < len(lost):
             taken[k] = min(lost[i] * parts[k] / max(area[i], 1e-300), masses[k])
-            given[i] += taken[k]
+            summed[i] += taken[k]
             left[i] += masses[k] - taken[k]
     for k in range(len(body)):
         i = body[k]
         if i < len(lost):
-            missing = lost[i] - given[i]
+            missing = lost[i] - summed[i]
             more = min(missing / max(left[i], 1e-300) if missing > 0.0 else 0.0, 1.0)
             taken[k] = min(taken[k] + more * (masses[k] - taken[k]), masses[k])
 

@@ -70,12 +70,12 @@ class Feeds(CaseFeature):
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
-        self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
+        self.feeds = [_feed(case, table, number) for number, table in enumerate(case.feed)]
         self.outlets: dict[str, ParticleOutlet] = {
-            f"outlet.{number}": ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True)
-            for number, each in enumerate(case.outlet)
+            f"outlet.{number}": ParticleOutlet(box.corner, tuple(np.add(box.corner, box.size)), inside=True)
+            for number, box in enumerate(case.outlet)
         }
-        self._openings = {f"patch.{name}": Opening(case, each) for name, each in case.drains.items()}
+        self._openings = {f"patch.{name}": Opening(case, patch) for name, patch in case.drains.items()}
         self.outlets |= self._openings
         self._summary: tuple[int, tuple[float, ...]] = (-1, ())  # number that left, and what their times gave
 
@@ -92,8 +92,8 @@ class Feeds(CaseFeature):
 
     def before(self, simulation: Any, step: float) -> None:
         """Note the step, over which particles must not bounce off an opening [s]."""
-        for each in self._openings.values():
-            each.step = step
+        for opening in self._openings.values():
+            opening.step = step
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
@@ -120,47 +120,49 @@ class Feeds(CaseFeature):
     @property
     def fed(self) -> int:
         """Number of particles that have entered."""
-        return sum(each.entered for each in self.feeds)
+        return sum(feed.entered for feed in self.feeds)
 
     @property
     def waiting(self) -> int:
         """Number of particles that are due, and found no free place so far."""
-        return sum(len(each.waiting) for each in self.feeds)
+        return sum(len(feed.waiting) for feed in self.feeds)
 
     @property
     def residence_times(self) -> np.ndarray:
         """How long each particle that has left was there, where this is known (n,) [s]."""
-        return np.concatenate([np.zeros(0), *(each.times for each in self.outlets.values())])
+        return np.concatenate([np.zeros(0), *(outlet.times for outlet in self.outlets.values())])
 
     @property
     def of_residence_times(self) -> tuple[float, ...]:
         """Mean, standard deviation, 10, 50 and 90 % quantile of the residence times; NaN before any is known [s]."""
         if (count := self.removed[0]) != self._summary[0]:
-            times, found = self.residence_times, [math.nan] * 5
+            times, numbers = self.residence_times, [math.nan] * 5
             if len(times):  # local: every rank has all times
-                found = [float(each) for each in (np.mean(times), np.std(times), *np.quantile(times, (0.1, 0.5, 0.9)))]
-            self._summary = count, tuple(found)
+                quantiles = np.quantile(times, (0.1, 0.5, 0.9))
+                numbers = [float(number) for number in (np.mean(times), np.std(times), *quantiles)]
+            self._summary = count, tuple(numbers)
         return self._summary[1]
 
     @property
     def removed(self) -> tuple[int, float]:
         """Number and mass of the particles that have left [-], [kg]."""
-        return sum(each.left for each in self.outlets.values()), sum(each.mass for each in self.outlets.values())
+        outlets = self.outlets.values()
+        return sum(outlet.left for outlet in outlets), sum(outlet.mass for outlet in outlets)
 
     def checkpoint(self) -> dict[str, Any]:
         """What feeds and outlets have done so far."""
-        return {name: each.checkpoint() for name, each in self._by_name()}
+        return {name: device.checkpoint() for name, device in self._by_name()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of the same case."""
-        for name, each in self._by_name():
-            each.restore(state[name])
+        for name, device in self._by_name():
+            device.restore(state[name])
         self._summary = (-1, ())
 
     def _by_name(self) -> Iterator[tuple[str, Feed | ParticleOutlet]]:
         """All feeds and outlets by name."""
-        yield from ((f"feed_{number}", each) for number, each in enumerate(self.feeds))
-        yield from ((name.replace(".", "_"), each) for name, each in self.outlets.items())
+        yield from ((f"feed_{number}", feed) for number, feed in enumerate(self.feeds))
+        yield from ((name.replace(".", "_"), outlet) for name, outlet in self.outlets.items())
 
 
 class Opening(ParticleOutlet):
@@ -201,24 +203,24 @@ def _drained(case: Case) -> bool:
     return bool(case.outlet or case.drains)
 
 
-def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
+def _feed(case: Case, table: CaseFeed, number: int) -> Feed:
     """A feed of a case."""
-    species = fed_species(case, given)
+    species = fed_species(case, table)
     names = list(case.species)
-    middle = given.corner[2] + 0.5 * given.size[2]
+    middle = table.corner[2] + 0.5 * table.size[2]
     return Feed(
-        feed_rate(case, given),
-        given.corner,
-        given.size,
+        feed_rate(case, table),
+        table.corner,
+        table.size,
         _sizes(species),
         case.material_of(species).density,
-        velocity=given.velocity,
+        velocity=table.velocity,
         material=list(case.material).index(case.material_name_of(species)),
         viscosity=float(case.around.viscosity_at(np.array([middle]))[0]),
         seed=(case.bed.seed, number, _FED),
-        begin=given.begin,
-        end=math.inf if given.end is None else given.end,
-        finish=_fresh(None if given.species is None else names.index(given.species), _drained(case)),
+        begin=table.begin,
+        end=math.inf if table.end is None else table.end,
+        finish=_fresh(None if table.species is None else names.index(table.species), _drained(case)),
     )
 
 

@@ -25,17 +25,17 @@ class MovingWalls(CaseFeature):
         first = len(simulation.particle_solver.walls.sweep) - len(case.wall)  # the walls of the case are the last ones
         self._motions = WallMotions([
             Motion(
-                first + number, each.velocity, each.spin, each.amplitude, each.frequency, each.begin,
-                math.inf if each.end is None else each.end,
+                first + number, wall.velocity, wall.spin, wall.amplitude, wall.frequency, wall.begin,
+                math.inf if wall.end is None else wall.end,
             )
-            for number, each in enumerate(case.wall)
-            if each.has_schedule
+            for number, wall in enumerate(case.wall)
+            if wall.has_schedule
         ])  # fmt: skip
 
     @classmethod
     def is_in(cls, case: Case) -> bool:
         """Whether a wall of the case has a schedule."""
-        return any(each.has_schedule for each in case.wall)
+        return any(wall.has_schedule for wall in case.wall)
 
     @property
     def step_limits(self) -> dict[str, float]:
@@ -60,25 +60,25 @@ def case_walls(case: Case, default: int) -> list[Wall]:
     ]
 
 
-def wall_of(given: CaseWall, material: int, key: str) -> Wall:
+def wall_of(wall: CaseWall, material: int, key: str) -> Wall:
     """A wall of a case as the solver takes it."""
-    velocity = tuple(np.array(given.velocity) + given.swing)
-    common: dict[str, Any] = {"velocity": velocity, "spin": given.spin, "centre": given.centre, "material": material}
+    velocity = tuple(np.array(wall.velocity) + wall.swing)
+    common: dict[str, Any] = {"velocity": velocity, "spin": wall.spin, "centre": wall.centre, "material": material}
     try:
-        if given.shape == "plane":
-            return Plane(point=given.point, normal=given.normal, **common)
-        if given.shape == "plate":
-            return Mesh.of_corners(triangles(given), **common)
-        if given.shape == "cylinder":
+        if wall.shape == "plane":
+            return Plane(point=wall.point, normal=wall.normal, **common)
+        if wall.shape == "plate":
+            return Mesh.of_corners(triangles(wall), **common)
+        if wall.shape == "cylinder":
             return Cylinder(
-                point=given.point, axis=given.axis, radius=given.radius or 0.0, length=given.length, caps=given.caps,
-                outside=given.outside, **common,
+                point=wall.point, axis=wall.axis, radius=wall.radius or 0.0, length=wall.length, caps=wall.caps,
+                outside=wall.outside, **common,
             )  # fmt: skip
-        if given.shape == "cone":
+        if wall.shape == "cone":
             return Cone(
-                point=given.point, axis=given.axis, radius=given.radius or 0.0, top_radius=given.top_radius or 0.0,
-                length=given.length or 0.0, **common,
+                point=wall.point, axis=wall.axis, radius=wall.radius or 0.0, top_radius=wall.top_radius or 0.0,
+                length=wall.length or 0.0, **common,
             )  # fmt: skip
-        return Mesh.from_stl(given.file or "", scale=given.scale, place=given.point, **common)
+        return Mesh.from_stl(wall.file or "", scale=wall.scale, place=wall.point, **common)
     except InputError as failure:
         raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None

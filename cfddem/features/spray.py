@@ -60,18 +60,18 @@ class SprayZone(CaseFeature):
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
-        given = case.spray
-        assert given is not None
-        first, second = given.extremes
-        if given.zone == "cone":
-            zone = cone(first, given.axis, math.radians(given.angle), given.length or 0.0)
+        keys = case.spray
+        assert keys is not None
+        first, second = keys.extremes
+        if keys.zone == "cone":
+            zone = cone(first, keys.axis, math.radians(keys.angle), keys.length or 0.0)
         else:
             zone = box(first, second - first)
-        end = math.inf if given.end is None else given.end
+        end = math.inf if keys.end is None else keys.end
         heat = Heat.of(case)
         self.warms = bool(heat and heat.spray_temperature)
         self.spray = Spray(
-            given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=simulation.communicator
+            keys.rate, keys.drop_volume, zone, case.bed.seed, keys.begin, end, communicator=simulation.communicator
         )
 
     def after(self, simulation: Any) -> None:
@@ -109,12 +109,12 @@ def note_visits(particles: Particles, inside: np.ndarray, time: float) -> None:
     time       now [s]
     """
     entered = particles.zone_entered
-    known = np.isfinite(entered)
-    leaves = particles.zone_inside & ~inside & known
+    was_inside = np.isfinite(entered)
+    leaves = particles.zone_inside & ~inside & was_inside
     particles.zone_visits += leaves
     particles.zone_visit_time += np.where(leaves, time - entered, 0.0)
     enters = inside & ~particles.zone_inside
-    returns = enters & known
+    returns = enters & was_inside
     particles.zone_rounds += returns
     particles.zone_round_time += np.where(returns, time - entered, 0.0)
     particles.zone_entered = np.where(enters, time, entered)

@@ -79,9 +79,9 @@ class Vapour(CaseFeature):
         """Change of the vapour in the fluid that nothing gave, over what was given, at least a millionth of the fluid
         [-]."""
         sums = self.cells.sums
-        given = sums["inflow"] - sums["outflow"] + sums["displaced"] - self.received
+        expected = sums["inflow"] - sums["outflow"] + sums["displaced"] - self.received
         scale = self.scale + abs(sums["inflow"]) + abs(sums["outflow"])
-        return abs(self.cells.content - given) / max(scale, LEAST * self.cells.capacity)
+        return abs(self.cells.content - expected) / max(scale, LEAST * self.cells.capacity)
 
     def conductance(self, terms: Any) -> np.ndarray:
         """Conductance of the whole surface of every particle, by the law of heat transfer as Sherwood number (N,)
@@ -101,8 +101,8 @@ class Vapour(CaseFeature):
         kernel, cell_map = simulation.coupling.kernel, simulation.terms.cell_map
         sent = np.stack([conductance, conductance * surface], axis=1)
         coefficient, product = kernel.spread(cell_map, sent) / kernel.grid.cell_volume
-        seen = self.cells.step(coefficient, product)
-        around = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(seen), seen]))
+        fractions = self.cells.step(coefficient, product)
+        around = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(fractions), fractions]))
         received = np.asarray(step * conductance * (around[:, 1] - around[:, 0] * surface))
         sums = self.communicator.sum([received, np.abs(received)], axis=1)
         self.received += float(sums[0])
