@@ -189,11 +189,11 @@ class Bed(Species):
         if self.species:
             self._check_mixture()
         else:
-            given = [name for name in ("count", "height", "positions") if getattr(self, name)]
-            if len(given) != 1:
-                found = " and ".join(given) if given else "none"
+            names = [name for name in ("count", "height", "positions") if getattr(self, name)]
+            if len(names) != 1:
+                choices = " and ".join(names) if names else "none"
                 raise InputError(
-                    "count", self.count, "given, or height, or positions, and only one of them", f"found {found}"
+                    "count", self.count, "given, or height, or positions, and only one of them", f"found {choices}"
                 )
         if (self.start_corner is None) != (self.start_size is None):
             name = "start_corner" if self.start_corner is None else "start_size"
@@ -309,8 +309,8 @@ class CaseFeed(Checked):
     @model_validator(mode="after")
     def _one_rate_and_a_span(self) -> CaseFeed:
         if (self.rate is None) == (self.mass_rate is None):
-            found = "found none" if self.rate is None else "found both"
-            raise InputError("rate", self.rate, "given, or mass_rate, and only one of them", found)
+            how_many = "found none" if self.rate is None else "found both"
+            raise InputError("rate", self.rate, "given, or mass_rate, and only one of them", how_many)
         if self.end is not None and self.end <= self.begin:
             raise InputError("end", self.end, f"after the beginning, {self.begin:g} s")
         return self

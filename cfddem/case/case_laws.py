@@ -153,10 +153,10 @@ class CaseLaws(Checked):
     def _contact_exists(self) -> CaseLaws:
         if "contact" in self.missing:
             return self
-        known = contact_named(self.contact).parameters
+        parameters = contact_named(self.contact).parameters
         for name, value in self.contact_parameters.items():
-            if name not in known:
-                limit = nearest(name, known) if known else f"left out; {self.contact} has no parameters"
+            if name not in parameters:
+                limit = nearest(name, parameters) if parameters else f"left out; {self.contact} has no parameters"
                 raise InputError(f"contact_parameters.{name}", value, limit)
         return self
 
@@ -196,8 +196,8 @@ class CaseLaws(Checked):
     @property
     def added_mass_law(self) -> float | Law:
         """Added-mass coefficient, or the law that gives it."""
-        given = 0.0 if "added_mass" in self.missing else self.added_mass
-        return chosen("added_mass", given) if isinstance(given, str) or callable(given) else given
+        law = 0.0 if "added_mass" in self.missing else self.added_mass
+        return chosen("added_mass", law) if isinstance(law, str) or callable(law) else law
 
     def added_mass_at(self, voidage: float) -> float:
         """Added-mass coefficient at a voidage [-]."""
@@ -223,15 +223,15 @@ class CaseLaws(Checked):
     @property
     def pair_laws(self) -> dict[str, Law]:
         """Laws that replace the built-in laws of the pair loop, by kind."""
-        given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication") if kind not in self.missing}
-        return {kind: chosen(kind, law) for kind, law in given.items() if law not in BUILT_IN[kind]}
+        chosen_laws = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication") if kind not in self.missing}
+        return {kind: chosen(kind, law) for kind, law in chosen_laws.items() if law not in BUILT_IN[kind]}
 
     @property
     def own_laws(self) -> dict[str, Law]:
         """Laws of the case that are not built in, by their keys."""
         agitation = self.agitation
         named = isinstance(agitation, str) and agitation in (*BUILT_IN["agitation"], *self.missing.values())
-        found = {
+        laws = {
             "drag": self.drag_law,
             "added_mass": self.added_mass_law,
             **self.pair_laws,
@@ -239,7 +239,7 @@ class CaseLaws(Checked):
             "heat_transfer": self.heat_law,
             "drying": self.drying_law,
         }
-        return {kind: law for kind, law in found.items() if isinstance(law, Law) and not is_built_in(law.function)}
+        return {kind: law for kind, law in laws.items() if isinstance(law, Law) and not is_built_in(law.function)}
 
     def drag_function(self, diameter_ratio: float = 1.0) -> Callable[[float, float], float] | None:
         """Drag factor as a function of Reynolds number and voidage; None without drag.

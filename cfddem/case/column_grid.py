@@ -24,7 +24,7 @@ def grid_of(case: CaseTables) -> Grid:
     """Cells of the column, cut by its vessel; cells outside a cylinder, and behind walls, are solid."""
     if case.has_smooth_walls:
         thin = case.thin_walls
-        stamps = tuple(stamp(each) for each in (case.vessel, *thin) if each)
+        stamps = tuple(stamp(wall) for wall in (case.vessel, *thin) if wall)
         return _in_vessel(case.column, case.vessel, case.openings, thin, stamps)
     walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
@@ -51,7 +51,7 @@ def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int],
         closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))
     if not closing:
         return Grid.of_size(column.size, column.cell)
-    return Grid.of_size(column.size, column.cell, solid=lambda x, y, z: _any(each(x, y, z) for each in closing))
+    return Grid.of_size(column.size, column.cell, solid=lambda x, y, z: _any(surface(x, y, z) for surface in closing))
 
 
 def open_floor(case: CaseTables) -> Region | None:

@@ -82,15 +82,15 @@ def points_of(name: str, data: CaseData) -> Points:
     """
     path = Path(data.file)
     columns = _columns(path)
-    against = [each for each in ABSCISSAE if each in columns]
+    against = [name for name in ABSCISSAE if name in columns]
     if len(against) > 1:
         remedy = "call the height of a bed: bed height" if "height" in against else ""
         raise InputError(f"{path}", None, f"a table with one of {' and '.join(against)}", remedy)
     others = _value_columns(columns)
     wanted = "_".join(data.column.lower().split()) if data.column is not None else None
     if wanted is None and len(others) != 1:
-        found = ", ".join(others) or "none"
-        raise InputError(f"{path}", None, f"a table with one column of values; found {found}", "name one: column")
+        names = ", ".join(others) or "none"
+        raise InputError(f"{path}", None, f"a table with one column of values; found {names}", "name one: column")
     if wanted is not None and wanted not in columns:
         raise InputError(f"compare.{name}.column", data.column, nearest(wanted, others))
     chosen = columns[wanted or others[0]]
@@ -114,9 +114,9 @@ def value_columns(path: Path) -> list[str]:
 
 def _columns(path: Path) -> dict[str, Column]:
     """The columns of a file by their names; a velocity is that of the inlet."""
-    columns = {each.name: each for each in read_table(path)}
-    for name, each in columns.items():
-        if each.unit == "m3/s":
+    columns = {column.name: column for column in read_table(path)}
+    for name, column in columns.items():
+        if column.unit == "m3/s":
             remedy = "divide the flow rate by the floor area of the column in which it was measured"
             raise InputError(f"{path} {name}", None, "a velocity, such as: velocity [cm/s]", remedy)
     for name in VELOCITIES:
@@ -126,7 +126,7 @@ def _columns(path: Path) -> dict[str, Column]:
 
 
 def _value_columns(columns: Mapping[str, Column]) -> list[str]:
-    return [each for each in columns if each not in ABSCISSAE and each != ERROR and not each.endswith(f"_{ERROR}")]
+    return [name for name in columns if name not in ABSCISSAE and name != ERROR and not name.endswith(f"_{ERROR}")]
 
 
 def held(inlet: float | Sequence[tuple[float, float]], until: float, velocities: Array) -> np.ndarray:
@@ -140,7 +140,7 @@ def held(inlet: float | Sequence[tuple[float, float]], until: float, velocities:
     else:
         steps = [low for (_, low), (_, high) in pairwise(inlet) if math.isclose(low, high, rel_tol=HELD)]
         steps += [velocity for time, velocity in inlet[-1:] if time < until]
-    return np.array([any(math.isclose(each, step, rel_tol=HELD) for step in steps) for each in velocities])
+    return np.array([any(math.isclose(velocity, step, rel_tol=HELD) for step in steps) for velocity in velocities])
 
 
 def steps_of(velocities: Array, until: float) -> str:
@@ -156,8 +156,8 @@ def steps_of(velocities: Array, until: float) -> str:
     step = until / len(held_at)
     begins = [step * (place + 0.01 * (place > 0)) for place in range(len(held_at))]
     pairs = [
-        f"[{begin:.4g}, {each:.4g}], [{step * (place + 1):.4g}, {each:.4g}]"
-        for place, (begin, each) in enumerate(zip(begins, held_at))
+        f"[{begin:.4g}, {end:.4g}], [{step * (place + 1):.4g}, {end:.4g}]"
+        for place, (begin, end) in enumerate(zip(begins, held_at))
     ]
     return f"bed.inlet_velocity = [{', '.join(pairs)}]"
 
@@ -193,20 +193,21 @@ def require_measured_unit(points: Points, units: Mapping[str, str]) -> None:
     units   of the columns of the history, by their names
     errors  InputError
     """
-    known = PROFILES if points.against == "height" else {key: each for key, each in units.items() if key != "time"}
-    if points.quantity not in known:
-        raise unknown_quantity(points.name, points.quantity, known)
-    require_unit(points, known[points.quantity])
+    units_of = PROFILES if points.against == "height" else {key: unit for key, unit in units.items() if key != "time"}
+    if points.quantity not in units_of:
+        raise unknown_quantity(points.name, points.quantity, units_of)
+    require_unit(points, units_of[points.quantity])
 
 
-def unknown_quantity(name: str, quantity: str, known: Iterable[str]) -> InputError:
+def unknown_quantity(name: str, quantity: str, names: Iterable[str]) -> InputError:
     """The error of measured data of a quantity that no run has.
 
-    name   of the data
-    known  measures of the run
+    name      of the data
+    quantity  that they are of
+    names     of the measures of the run
     """
     remedy = "name the column after a measure of the report, such as bed height or pressure drop"
-    return InputError(f"compare.{name}.quantity", quantity, nearest(quantity, known), remedy)
+    return InputError(f"compare.{name}.quantity", quantity, nearest(quantity, names), remedy)
 
 
 def require_unit(points: Points, unit: str) -> None:
@@ -241,7 +242,7 @@ def data_in(measured: Mapping[str, CaseData], folder: Path) -> dict[str, CaseDat
 
 def with_data(measured: Mapping[str, CaseData], place: Callable[[str, str], str]) -> dict[str, CaseData]:
     """Measured data with other files, each from the name of the data and the file that they have now."""
-    return {name: each.model_copy(update={"file": place(name, each.file)}) for name, each in measured.items()}
+    return {name: points.model_copy(update={"file": place(name, points.file)}) for name, points in measured.items()}
 
 
 def copy_of(folder: Path, name: str) -> Path:

@@ -88,7 +88,7 @@ def read_table(path: Path) -> list[Column]:
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is neither empty nor a comment."""
     text = _text(path)
-    lines = [(n, each) for n, each in enumerate(text.splitlines(), 1) if each.strip() and each.lstrip()[0] != "#"]
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and line.lstrip()[0] != "#"]
     if not lines:
         return
     sign = max(",;\t", key=lines[0][1].count)
@@ -122,22 +122,22 @@ def _text(path: Path) -> str:
 def _heading(place: str, text: str) -> tuple[str, str]:
     """Name and unit of a column."""
     text = text if "[" in text else re.sub(r"\(([^()]*)\)\s*$", r"[\1]", text)
-    found = _HEADING.fullmatch(text)
-    if found is None or not found["name"] or not text.isprintable():
+    heading = _HEADING.fullmatch(text)
+    if heading is None or not heading["name"] or not text.isprintable():
         raise InputError(place, shown(text), "a name and a unit, such as: bed height [mm]")
-    unit = re.sub(r"\b([mu]?)L\b", r"\1l", (found["unit"] or "").translate(_PLAIN))
-    if found["unit"] is None:
+    unit = re.sub(r"\b([mu]?)L\b", r"\1l", (heading["unit"] or "").translate(_PLAIN))
+    if heading["unit"] is None:
         raise InputError(place, shown(text), "followed by its unit, such as: bed height [mm], voidage [-]")
     if unit not in UNITS:
         raise InputError(f"{place} unit", shown(unit), nearest(unit, UNITS))
-    return re.sub(r"[\s_]+", "_", found["name"].lower()), unit
+    return re.sub(r"[\s_]+", "_", heading["name"].lower()), unit
 
 
 def _numbers(place: str, cells: list[str], names: list[str]) -> list[float]:
     """The numbers of a line."""
     if len(cells) != len(names):
         raise InputError(place, len(cells), f"{len(names)} numbers, one for each column of the header")
-    found = []
+    numbers = []
     for name, text in zip(names, cells):
         try:
             value = float(text)
@@ -146,5 +146,5 @@ def _numbers(place: str, cells: list[str], names: list[str]) -> list[float]:
             raise InputError(f"{place} {name}", shown(text.strip()), "a number", remedy) from None
         if not math.isfinite(value) or "_" in text:
             raise InputError(f"{place} {name}", shown(text.strip()), "a finite number")
-        found.append(value)
-    return found
+        numbers.append(value)
+    return numbers

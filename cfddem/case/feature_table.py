@@ -70,9 +70,9 @@ class FeatureTable(Checked):
 
 def feature_tables() -> list[type[FeatureTable]]:
     """All tables that features own, by the names of their files."""
-    for each in sorted(pkgutil.iter_modules([str(ROOM)]), key=lambda each: each.name):
-        if each.name.endswith("_keys"):
-            importlib.import_module(f"cfddem.features.{each.name}")
+    for module in sorted(pkgutil.iter_modules([str(ROOM)]), key=lambda module: module.name):
+        if module.name.endswith("_keys"):
+            importlib.import_module(f"cfddem.features.{module.name}")
     return FeatureTable.__subclasses__()
 
 
@@ -83,8 +83,8 @@ _OWNED: set[str] = set()
 
 def with_feature_tables(case: type[Model]) -> type[Model]:
     """Decorator: give the schema of a case the tables that features own."""
-    for each in feature_tables():
-        _add(case, each)
+    for table in feature_tables():
+        _add(case, table)
     _CASES.append(case)
     return case
 

@@ -25,8 +25,8 @@ def feed_rate(case: CaseTables, feed: CaseFeed) -> float:
 
 def fed_count(case: CaseTables) -> float:
     """Particles that all feeds bring until the end of the run."""
-    ends = (case.run.until if each.end is None else min(each.end, case.run.until) for each in case.feed)
-    return sum(feed_rate(case, each) * max(end - each.begin, 0.0) for each, end in zip(case.feed, ends))
+    ends = (case.run.until if feed.end is None else min(feed.end, case.run.until) for feed in case.feed)
+    return sum(feed_rate(case, feed) * max(end - feed.begin, 0.0) for feed, end in zip(case.feed, ends))
 
 
 def fed_species(case: CaseTables, feed: CaseFeed) -> Species:
@@ -59,8 +59,8 @@ def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
 
 
 def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
-    boxes = [(f"feed.{n}", each.corner, each.size) for n, each in enumerate(case.feed)]
-    boxes += [(f"outlet.{n}", each.corner, each.size) for n, each in enumerate(case.outlet)]
+    boxes = [(f"feed.{n}", feed.corner, feed.size) for n, feed in enumerate(case.feed)]
+    boxes += [(f"outlet.{n}", outlet.corner, outlet.size) for n, outlet in enumerate(case.outlet)]
     if case.bed.start_size is not None and case.bed.start_corner is not None:
         boxes.append(("bed.start", case.bed.start_corner, case.bed.start_size))
     whole = case.column.size
@@ -68,7 +68,7 @@ def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
         for low, edge, length in zip(corner, size, whole):
             if low < 0.0 or low + edge > length * (1.0 + 1e-9):
                 divider = "_" if key == "bed.start" else "."
-                limit = f"inside the column, 0 to {', '.join(f'{each:g}' for each in whole)} m"
+                limit = f"inside the column, 0 to {', '.join(f'{length:g}' for length in whole)} m"
                 remedy = f"the box ends at {', '.join(f'{a + b:.4g}' for a, b in zip(corner, size))} m"
                 yield InputError(f"{key}{divider}corner", corner, limit, remedy)
                 break
@@ -78,11 +78,11 @@ def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
                 remedy = "the law needs the past of a particle, and particles of a feed have none"
                 yield InputError(f"laws.{key}", shown(law), f"{none!r} where there is a feed in a fluid", remedy)
     for number, feed in enumerate(case.feed):
-        known = list(case.bed.species)
-        if feed.species is None and known:
-            yield InputError(f"feed.{number}.species", None, f"given, {nearest('', known)}")
-        elif feed.species is not None and feed.species not in known:
-            limit = nearest(feed.species, known) if known else "left out for a bed of one species"
+        names = list(case.bed.species)
+        if feed.species is None and names:
+            yield InputError(f"feed.{number}.species", None, f"given, {nearest('', names)}")
+        elif feed.species is not None and feed.species not in names:
+            limit = nearest(feed.species, names) if names else "left out for a bed of one species"
             yield InputError(f"feed.{number}.species", shown(feed.species), limit)
         if case.bed.fixed:
             yield InputError("bed.fixed", True, "false where there is a feed")

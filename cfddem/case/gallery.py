@@ -39,10 +39,10 @@ def copy_from_gallery(name: str, output: Path | None = None) -> Path:
     output   file to write; default: NAME.toml in the working directory
     returns  the file
     """
-    known = gallery_files()
-    if name.replace("_", "-") not in known:
-        raise InputError("name", name, nearest(name, known), "cfddem new lists the gallery")
-    source = known[name.replace("_", "-")]
+    files = gallery_files()
+    if name.replace("_", "-") not in files:
+        raise InputError("name", name, nearest(name, files), "cfddem new lists the gallery")
+    source = files[name.replace("_", "-")]
     output = output or Path(f"{source.parent.name}.toml")
     try:
         with output.open("x", encoding="utf-8") as file:
@@ -61,25 +61,25 @@ def find_case(name: Path | None) -> Path:
     if name is None:
         here = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
         if len(here) != 1:
-            found = ", ".join(path.name for path in here) or "none"
-            limit = f"given, unless the folder holds exactly one TOML file (found: {found})"
-            raise InputError("case", None, limit, "cfddem new liquid-bed writes one" if found == "none" else "")
+            names = ", ".join(path.name for path in here) or "none"
+            limit = f"given, unless the folder holds exactly one TOML file (found: {names})"
+            raise InputError("case", None, limit, "cfddem new liquid-bed writes one" if names == "none" else "")
         return here[0]
     if name.is_file():
         return name
-    known = gallery_files()
-    if str(name) in known:
-        return known[str(name)]
-    raise InputError("case", str(name), f"a file, or {nearest(str(name), known)}")
+    files = gallery_files()
+    if str(name) in files:
+        return files[str(name)]
+    raise InputError("case", str(name), f"a file, or {nearest(str(name), files)}")
 
 
-def overrides(given: Sequence[str]) -> dict[str, Any]:
+def overrides(texts: Sequence[str]) -> dict[str, Any]:
     """Values of `key=value` texts by full key; a file lies relative to the current folder, as in any command."""
     values: dict[str, Any] = {}
-    for each in given:
-        key, equals, text = each.partition("=")
+    for setting in texts:
+        key, equals, text = setting.partition("=")
         if not equals or not key:
-            raise InputError("--set", each, "key=value, such as bed.inlet_velocity=0.06")
+            raise InputError("--set", setting, "key=value, such as bed.inlet_velocity=0.06")
         key, value = full_key(key), read_value(text)
         is_file = key.endswith(".file") and isinstance(value, str)
         values[key] = os.path.abspath(value) if is_file else value
@@ -111,15 +111,15 @@ def full_key(key: str) -> str:
     }
     for several in NAMED:
         tables.pop(several)
-    found = [f"{name}.{key}" for name, words in tables.items() if key in words]
-    if len(found) > 1:
-        found = [each for each in found if not each.startswith(("liquid.", "spray."))] or found
-    if len(found) > 1:
-        raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
+    homes = [f"{name}.{key}" for name, words in tables.items() if key in words]
+    if len(homes) > 1:
+        homes = [home for home in homes if not home.startswith(("liquid.", "spray."))] or homes
+    if len(homes) > 1:
+        raise InputError("key", key, f"unambiguous: {' or '.join(homes)}")
     if key in Material.model_fields:
-        meant = " or ".join([*found, f"material.NAME.{key}"])
+        meant = " or ".join([*homes, f"material.NAME.{key}"])
         raise InputError("key", key, f"written as {meant}", "NAME is the name of a material of the case")
-    if not found:
-        known = sorted({*Case.model_fields, *itertools.chain(*tables.values())})
-        raise InputError("key", key, nearest(key, known), absent(key))
-    return found[0]
+    if not homes:
+        keys = sorted({*Case.model_fields, *itertools.chain(*tables.values())})
+        raise InputError("key", key, nearest(key, keys), absent(key))
+    return homes[0]

@@ -63,10 +63,10 @@ def input_error(
     place    location of a key, such as "bed.toml:14: "
     """
     reported, whole_tables = _without_moved_keys(_by_key(failure, values), values, model)
-    found = [(key, _one(key, several, model)) for key, several in itertools.islice(reported.items(), MOST)]
+    of_keys = [(key, _one(key, several, model)) for key, several in itertools.islice(reported.items(), MOST)]
     errors = []
     others = () if whole_tables else (((), error) for error in more)  # which follow from a missing table
-    for key, error in [*whole_tables, *found, *others]:
+    for key, error in [*whole_tables, *of_keys, *others]:
         beyond = error.field.removeprefix(dotted(key)).strip(".")  # a section names a key of its own
         rest = [int(part) if part.isdecimal() else part for part in beyond.split(".")] if beyond else []
         whole = (*key, *rest)
@@ -77,10 +77,10 @@ def input_error(
 
 def _by_key(failure: ValidationError, values: Any) -> dict[Key, list[Any]]:
     """Reports grouped by key; a value that may be of two types gives one report for each type."""
-    found: dict[Key, list[Any]] = {}
-    for each in failure.errors(include_url=False):
-        found.setdefault(_key(each["loc"], values, each["type"]), []).append(each)
-    return found
+    by_key: dict[Key, list[Any]] = {}
+    for report in failure.errors(include_url=False):
+        by_key.setdefault(_key(report["loc"], values, report["type"]), []).append(report)
+    return by_key
 
 
 def _without_moved_keys(
@@ -96,9 +96,11 @@ def _without_moved_keys(
             unknown.setdefault(key[:-1], []).append(str(key[-1]))
     errors: list[tuple[Key, InputError]] = []
     for table, words in unknown.items():
-        homes = [each for each in model.model_fields if _has_all(model.model_fields[each], words)]
-        missing = [each for each in homes if isinstance(values, Mapping) and each not in values]
-        home = next(iter(missing or (each for each in homes if "." in _header(each, model.model_fields[each]))), None)
+        homes = [table for table in model.model_fields if _has_all(model.model_fields[table], words)]
+        missing = [table for table in homes if isinstance(values, Mapping) and table not in values]
+        home = next(
+            iter(missing or (table for table in homes if "." in _header(table, model.model_fields[table]))), None
+        )
         if home is None:
             continue
         owner, wrong = model.model_fields[home], [str(key[-1]) for key in reported if key and key[:-1] == table]
@@ -115,7 +117,7 @@ def _without_moved_keys(
 
 def _has_all(field: FieldInfo, words: Iterable[str]) -> bool:
     """Whether a table has all of some keys."""
-    return any(all(word in each.model_fields for word in words) for each in sections_of(field))
+    return any(all(word in section.model_fields for word in words) for section in sections_of(field))
 
 
 def _header(name: str, field: FieldInfo) -> str:
@@ -154,7 +156,7 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
     if first["type"] == "extra_forbidden":
         remedy = absent(last) or _right_table(last, owner, model)
         return InputError(field, shown(first["input"]), nearest(last, owner.model_fields), remedy)
-    limits = dict.fromkeys(filter(None, (_limit(each) for each in reports)))
+    limits = dict.fromkeys(filter(None, (_limit(report) for report in reports)))
     named = next((str(part) for part in reversed(key[-2:]) if part in owner.model_fields), last)  # or values by name
     about = owner.model_fields[named].description if named in owner.model_fields else None
     value = None if limits.keys() == {"given"} else shown(first["input"])
@@ -186,8 +188,8 @@ def _limit(report: Any) -> str:
     if kind == "missing" and isinstance(report["loc"][-1], int):
         return "a longer list"
     if kind == "literal_error":
-        known = re.findall(r"'([^']*)'", str(context.get("expected", "")))
-        return nearest(str(report["input"])[:LONGEST], known)
+        choices = re.findall(r"'([^']*)'", str(context.get("expected", "")))
+        return nearest(str(report["input"])[:LONGEST], choices)
     if kind in ("tuple_type", "too_short", "too_long"):
         length = context.get("actual_length")
         return "a list" if length is None else f"a list of another length than {length}"
@@ -217,8 +219,8 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
     """Models in a type annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
-    for each in typing.get_args(annotation):
-        yield from _models(each)
+    for argument in typing.get_args(annotation):
+        yield from _models(argument)
 
 
 def _right_table(word: str, owner: type[BaseModel], model: type[BaseModel]) -> str:
@@ -248,11 +250,11 @@ def key_lines(text: str) -> dict[Key, int]:
     table: Key = ()
     count: dict[Key, int] = {}
     for number, line in enumerate(text.split("\n"), 1):
-        found = _LINE.match(line[:1000])
-        if found is None:
+        heading = _LINE.match(line[:1000])
+        if heading is None:
             continue
-        parts = tuple(each.strip("\"'") for each in re.findall(_PART, found["table"] or found["key"]))
-        if found["table"]:
+        parts = tuple(part.strip("\"'") for part in re.findall(_PART, heading["table"] or heading["key"]))
+        if heading["table"]:
             table = parts
             if line.lstrip().startswith("[["):  # one table of several
                 lines.setdefault(parts, number)

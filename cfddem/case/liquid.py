@@ -122,9 +122,9 @@ class Liquid(Checked):
 
     @model_validator(mode="after")
     def _at_most_one_amount(self) -> Liquid:
-        given = [name for name in AMOUNTS if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise InputError(given[1], getattr(self, given[1]), f"left out where {given[0]} is given")
+        amounts = [name for name in AMOUNTS if getattr(self, name) is not None]
+        if len(amounts) > 1:
+            raise InputError(amounts[1], getattr(self, amounts[1]), f"left out where {amounts[0]} is given")
         if self.wall_thickness > 0.0 and self.wall_share == 0.0:
             raise InputError("wall_share", 0.0, "above 0 where wall_thickness is given")
         if self.film_density > 0.0 and self.film == "none":
@@ -223,11 +223,11 @@ class Spray(Checked):
         size = case.column.size
         margin = ROUND_OFF * max(size)
         for name, place in zip(_ZONES[self.zone], self.extremes):
-            inside = all(-margin <= each <= length + margin for each, length in zip(place.tolist(), size))
+            inside = all(-margin <= coordinate <= length + margin for coordinate, length in zip(place.tolist(), size))
             if case.column.shape == "cylinder":
                 inside &= math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) <= 0.5 * size[0] + margin
             if not inside:
-                where = ", ".join(f"{each:.4g}" for each in place)
-                column = ", ".join(f"{each:g}" for each in size)
+                where = ", ".join(f"{coordinate:.4g}" for coordinate in place)
+                column = ", ".join(f"{length:g}" for length in size)
                 limit = f"chosen so that the spray zone lies in the column, 0 to {column} m"
                 raise InputError(f"spray.{name}", None, limit, f"it reaches to ({where}) m")

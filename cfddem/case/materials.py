@@ -112,18 +112,18 @@ class MaterialPair(Checked):
 
     def values(self, first: Material, second: Material) -> dict[str, float]:
         """Entries of the pair table that replace those of the two materials."""
-        given = {name: value for name, value in self if value is not None}
-        if "roughness" in given:
-            given["roughness_gap"] = given.pop("roughness")
+        properties = {name: value for name, value in self if value is not None}
+        if "roughness" in properties:
+            properties["roughness_gap"] = properties.pop("roughness")
         if self.friction is not None and first.friction_lubricated is None and second.friction_lubricated is None:
-            given.setdefault("friction_lubricated", self.friction)
-        return given
+            properties.setdefault("friction_lubricated", self.friction)
+        return properties
 
 
 def _named(values: Any) -> Any:
     """Materials by name, as given; refused if the properties of a material stand in place of names."""
-    given = values.values() if isinstance(values, Mapping) else ()
-    if given and not any(isinstance(each, Mapping | Material) for each in given):
+    tables = values.values() if isinstance(values, Mapping) else ()
+    if tables and not any(isinstance(table, Mapping | Material) for table in tables):
         raise InputError("material", None, "a table [material.NAME] for each solid", "for example [material.glass]")
     return values
 
@@ -145,19 +145,19 @@ def pair_overrides(
     }
 
 
-def unknown_materials(known: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
+def unknown_materials(materials: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
     """Errors for material names without a [material.NAME] table; `beds` holds the name used under each key."""
     for key, name in beds.items():
-        if name is None and len(known) > 1:
-            yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
+        if name is None and len(materials) > 1:
+            yield InputError(f"{key}.material", None, f"given, {nearest('', materials)}")
     uses: dict[str, list[str]] = {}
     for key, name in {**beds, "column": column}.items():
-        if name is not None and name not in known:
+        if name is not None and name not in materials:
             uses.setdefault(name, []).append(key)
     for name, keys in uses.items():
         others = f"; {len(keys) - 1} more keys name it, too" if len(keys) > 1 else ""
         remedy = f"every material is a table [material.NAME]{others}"
-        yield InputError(f"{keys[0]}.material", shown(name), nearest(name, known), remedy)
+        yield InputError(f"{keys[0]}.material", shown(name), nearest(name, materials), remedy)
 
 
 def check_pairs(materials: Mapping[str, Material], pairs: Mapping[str, Mapping[str, MaterialPair]]) -> None:

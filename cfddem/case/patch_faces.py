@@ -50,29 +50,29 @@ class PatchFaces(NamedTuple):
     @property
     def inlets(self) -> list[str]:
         """Names of the inlets of a given flow."""
-        return [name for name, each in self.patches.items() if each.brings]
+        return [name for name, patch in self.patches.items() if patch.brings]
 
 
 def patch_faces(case: CaseTables, side: str) -> PatchFaces:
     """The faces of the patches of a side; InputError for a patch that covers no opening."""
-    patches = {name: each for name, each in case.patches.items() if each.side == side}
-    made = PatchFaces(patches, {name: coverage(case, each) for name, each in patches.items()}, 1.0)
-    for name, share in made.shares.items():
+    patches = {name: patch for name, patch in case.patches.items() if patch.side == side}
+    faces = PatchFaces(patches, {name: coverage(case, patch) for name, patch in patches.items()}, 1.0)
+    for name, share in faces.shares.items():
         flows = patches[name].mass_flow is not None
         if not share.any() or (flows and open_area_of(case, patches[name]) == 0.0):
             remedy = "move it, or make it larger than a cell"
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
-    entering = [_covered(case, patches[name], made.shares[name]) for name in made.inlets]
-    closed = [made.whole(name) for name, each in patches.items() if not each.brings]
-    for name, each in patches.items():
+    entering = [_covered(case, patches[name], faces.shares[name]) for name in faces.inlets]
+    closed = [faces.whole(name) for name, patch in patches.items() if not patch.brings]
+    for name, patch in patches.items():
         opens = bool(case.vessel) and side not in ENDS
-        if opens and each.brings and closed:  # openings lie apart, and two may still meet in a face
-            made.shares[name][np.any(closed, axis=0)] = 0.0
-        if each.brings and (each.mass_flow is not None or opens):  # exactly, also where faces do not follow the edge
-            area, face = open_area_of(case, each), grid_of(case).face_area(PLANES[side][0])
-            made.shares[name][:] *= area / (float((made.shares[name] * _apertures(case, side)).sum()) * face)
+        if opens and patch.brings and closed:  # openings lie apart, and two may still meet in a face
+            faces.shares[name][np.any(closed, axis=0)] = 0.0
+        if patch.brings and (patch.mass_flow is not None or opens):  # exactly, also where faces do not follow the edge
+            area, face = open_area_of(case, patch), grid_of(case).face_area(PLANES[side][0])
+            faces.shares[name][:] *= area / (float((faces.shares[name] * _apertures(case, side)).sum()) * face)
     beside = np.maximum(1.0 - sum(entering), 0.0)
-    return made._replace(rest=np.where(np.any(closed, axis=0), 0.0, beside) if closed else beside)
+    return faces._replace(rest=np.where(np.any(closed, axis=0), 0.0, beside) if closed else beside)
 
 
 def _apertures(case: CaseTables, side: str) -> Array:
@@ -81,7 +81,7 @@ def _apertures(case: CaseTables, side: str) -> Array:
     here = layers(axis, -1 if high else 0)
     share: Array = grid.open[here].astype(float)
     if grid.walls:
-        points = [each[here] for each in np.broadcast_arrays(*grid.faces(axis))]
+        points = [coordinate[here] for coordinate in np.broadcast_arrays(*grid.faces(axis))]
         share *= section(grid.walls, points, axis, grid.spacing).share
     return share
 
@@ -91,17 +91,17 @@ def coverage(case: CaseTables, patch: CasePatch) -> Array:
     (width, depth), (axis, high), grid = lengths_of(case, patch.side), PLANES[patch.side], grid_of(case)
     nx, ny = (grid.cells[d] for d in along(patch.side))
     x = (np.arange(nx * PLACES) + 0.5) * width / (nx * PLACES)
-    made = np.zeros((ny, nx))
+    shares = np.zeros((ny, nx))
     for row, is_open in enumerate(grid.open[layers(axis, -1 if high else 0)]):
         y = (row * PLACES + np.arange(PLACES)[:, None] + 0.5) * depth / (ny * PLACES)
         inside = np.repeat(is_open, PLACES) * np.ones(y.shape)
         if case.vessel:
-            at = [each.ravel() for each in np.broadcast_arrays(x, y)]
+            at = [coordinate.ravel() for coordinate in np.broadcast_arrays(x, y)]
             inside = inside * on_the_side(case, patch.side, *at).reshape(inside.shape)
         weight = patch.weight(x, y, middle_of(case, patch.side)) * inside
         sums = [values.reshape(PLACES, nx, PLACES).sum(axis=(0, 2)) for values in (weight, inside)]
-        made[row] = sums[0] / np.maximum(sums[1], 1.0)
-    return made
+        shares[row] = sums[0] / np.maximum(sums[1], 1.0)
+    return shares
 
 
 def _covered(case: CaseTables, patch: CasePatch, share: Array) -> Array:
@@ -130,18 +130,18 @@ def brought_in(
     """
     if not of_patches:
         return rest
-    found = {name: patch_faces(case, side) for name, side in SIDE_OF.items()}
+    by_side = {name: patch_faces(case, side) for name, side in SIDE_OF.items()}
     own = case.bed.highest_inlet_velocity if case.column.ends == "flow" else 0.0
 
     def values(side: str, x: Array, y: Array, z: Array) -> Array:
-        faces = found[side]
+        faces = by_side[side]
         if not faces.inlets:
             return np.full(np.shape(x), rest)
         at = face_at(case, SIDE_OF[side], x, y, z)
         flow = {name: faces.patches[name].highest * faces.shares[name][at] for name in faces.inlets}
         beside = own * (side == "z_low") * faces.rest[at]
         total = beside + sum(flow.values())
-        brought: Any = beside * rest + sum(of_patches.get(name, rest) * each for name, each in flow.items())
+        brought: Any = beside * rest + sum(of_patches.get(name, rest) * speed for name, speed in flow.items())
         return np.where(total > 0.0, brought / np.where(total > 0.0, total, 1.0), rest)
 
     return values

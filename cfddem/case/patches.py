@@ -121,7 +121,7 @@ class CasePatch(Checked):
         if self.mass_flow is None or through == 0.0:
             return self
         flow = self.mass_flow
-        speed = tuple((t, each / through) for t, each in flow) if isinstance(flow, tuple) else flow / through
+        speed = tuple((t, value / through) for t, value in flow) if isinstance(flow, tuple) else flow / through
         return self.model_copy(update={"velocity": speed})
 
     @property
@@ -208,7 +208,9 @@ def on_the_side(case: Any, side: str, x: Array, y: Array) -> NDArray[np.bool_]:
     (width, depth), (axis, high) = lengths_of(case, side), PLANES[side]
     inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
     if side not in ENDS and case.vessel:
-        ducts = (each.weight(x, y, (0.5 * width, 0.5 * depth)) > 0.0 for each in case.openings if each.side == side)
+        ducts = (
+            opening.weight(x, y, (0.5 * width, 0.5 * depth)) > 0.0 for opening in case.openings if opening.side == side
+        )
         return np.asarray(inside & np.any([*ducts], axis=0))
     places = np.insert(np.stack([x, y], axis=-1), axis, case.column.size[axis] if high else 0.0, axis=-1)
     return np.asarray(inside & (case.beyond_the_side(places) <= 0.0))
@@ -221,7 +223,7 @@ def _sampled(case: Any, patch: CasePatch) -> tuple[Array, NDArray[np.bool_]]:
     edges = patch.size or (2.0 * width, 2.0 * depth)
     reach = patch.diameter or float(max(edges))
     around = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
-    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + around, middle[1] + around))
+    x, y = (coordinate.reshape(-1) for coordinate in np.meshgrid(middle[0] + around, middle[1] + around))
     return patch.weight(x, y, middle), on_the_side(case, patch.side, x, y)
 
 
@@ -246,7 +248,7 @@ def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float], instead: s
     key      of the table with these names
     instead  the key of what enters by a pressure
     """
-    inlets = [name for name, each in case.patch.items() if each.brings]
+    inlets = [name for name, patch in case.patch.items() if patch.brings]
     for name, value in names.items():
         if name in case.patch and case.patch[name].pressure is not None:
             limit = "left out for a patch that is driven by a pressure"

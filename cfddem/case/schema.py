@@ -57,7 +57,7 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _material_names_exist(self) -> Case:
-        named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
+        named = {f"bed.species.{name}": species.material for name, species in self.bed.species.items()}
         for error in unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
             raise error
         check_pairs(self.material, self.pair)
@@ -100,7 +100,7 @@ class Case(CaseTables):
                 continue
             for d, length in enumerate(self.column.size):
                 if self.column.periodic[d] and (reach[0, d] <= 0.0 or reach[1, d] >= length):
-                    low, high = (f"{each:.4g}" for each in reach[:, d])
+                    low, high = (f"{end:.4g}" for end in reach[:, d])
                     raise InputError(f"wall.{n}.point", shown(wall.point), f"such that the thin wall ends before the "
                                      f"periodic sides, at 0 and {length:g} m along {'xyz'[d]}", f"it reaches from "
                                      f"{low} to {high} m; move it, or make it smaller")  # fmt: skip
@@ -118,10 +118,10 @@ class Case(CaseTables):
         refuse_openings(self)
         if self.bed.jet:
             raise InputError("bed.jet", None, "left out where there are patches", 'make it a patch, kind = "inlet"')
-        kinds = [(each.kind, each.side, each.shape) for each in self.patch.values()]
+        kinds = [(patch.kind, patch.side, patch.shape) for patch in self.patch.values()]
         of_lid = [kind for kind, side, shape in kinds if side == "lid" and shape == "whole"]
         leaves = ends == "flow" and not {"wall", "inlet"} & {*of_lid}
-        inlets = [name for name, each in self.patch.items() if each.kind == "inlet"]
+        inlets = [name for name, patch in self.patch.items() if patch.kind == "inlet"]
         flows = self.bed.highest_inlet_velocity > 0.0
         enters = [f"patch.{name}" for name in inlets] + ["bed.inlet_velocity"] * (ends == "flow" and flows)
         if enters and not leaves and "outlet" not in {kind for kind, _, _ in kinds}:
@@ -141,7 +141,7 @@ class Case(CaseTables):
     def feature_tables(self) -> list[FeatureTable]:
         """Tables of this case that features own."""
         values = (getattr(self, name) for name in type(self).model_fields)
-        return [each for each in values if isinstance(each, FeatureTable)]
+        return [value for value in values if isinstance(value, FeatureTable)]
 
     @property
     def solid(self) -> Material:
@@ -158,12 +158,12 @@ class Case(CaseTables):
         """Number of particles of each species: as given, or as many as a poured bed of the given height holds."""
         bed = self.bed
         if bed.height is None:
-            return {name: each.count or len(bed.positions) for name, each in self.species.items()}
+            return {name: species.count or len(bed.positions) for name, species in self.species.items()}
         vessel = vessel_of(self)
         volume = self.floor_area * bed.height if vessel is None else vessel.below(bed.height)
         solids = POURED_SOLID_FRACTION * volume
         shares = bed.species_volumes(solids) or dict.fromkeys(self.species, solids)
-        return {name: int(shares[name] / each.mean_volume) for name, each in self.species.items()}
+        return {name: int(shares[name] / species.mean_volume) for name, species in self.species.items()}
 
     @property
     def volumes(self) -> dict[str, float]:
@@ -190,10 +190,10 @@ class Case(CaseTables):
         U, are within its range and the density ratios at least HEAVY, and "none" otherwise. The solid fraction is
         compared with the range during the run.
         """
-        given = self.laws.agitation
-        if given == "auto" or "agitation" in self.laws.missing:
-            return law_of(free_spheres) if given == "auto" and self._agitation_is_measured else "none"
-        return given if isinstance(given, str) and given in BUILT_IN["agitation"] else chosen("agitation", given)
+        choice = self.laws.agitation
+        if choice == "auto" or "agitation" in self.laws.missing:
+            return law_of(free_spheres) if choice == "auto" and self._agitation_is_measured else "none"
+        return choice if isinstance(choice, str) and choice in BUILT_IN["agitation"] else chosen("agitation", choice)
 
     @property
     def surface(self) -> Literal["smeared", "sharp"]:
@@ -252,15 +252,15 @@ class Case(CaseTables):
         fluid, ranges = self.required_fluid, law_of(free_spheres).ranges
         numbers = [
             {
-                "density_ratio": self.material_of(each).density / fluid.density,
-                "reynolds": fluid.density * self.fastest_inflow * each.diameter / fluid.viscosity,
+                "density_ratio": self.material_of(species).density / fluid.density,
+                "reynolds": fluid.density * self.fastest_inflow * species.diameter / fluid.viscosity,
             }
-            for each in self.species.values()
+            for species in self.species.values()
         ]
         return all(
-            ranges[name][0] <= value <= ranges[name][1] and each["density_ratio"] >= HEAVY
-            for each in numbers
-            for name, value in each.items()
+            ranges[name][0] <= value <= ranges[name][1] and state["density_ratio"] >= HEAVY
+            for state in numbers
+            for name, value in state.items()
         )
 
     @property
@@ -283,8 +283,8 @@ class Case(CaseTables):
         if self.run.reference_speed is not None:
             return self.run.reference_speed
         fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest_diameter)
-        speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*each.velocity) for each in self.feed)]
-        speeds += [each.fastest for each in self.wall if math.isfinite(each.fastest)]
+        speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*feed.velocity) for feed in self.feed)]
+        speeds += [wall.fastest for wall in self.wall if math.isfinite(wall.fastest)]
         speeds += [abs(self.vessel.spin) * max(radius for _, radius in self.line)] if self.vessel else []
         return max(2.0 * self.fastest_inflow, self.fastest_by_pressure, fall, *speeds)
 
@@ -315,10 +315,10 @@ class Case(CaseTables):
         try:
             return cls.model_validate(values, context={"finished": finished})
         except ValidationError as failure:
-            lines, given = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
+            lines, overridden = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
 
             def place(key: Key) -> str:
-                if tuple(map(str, key)) in given:
+                if tuple(map(str, key)) in overridden:
                     return "--set "
                 line = line_of(key, lines)
                 return f"{name}: " if line is None else f"{name}:{line}: "
@@ -362,19 +362,19 @@ def _given(value: float | None, default: float) -> float:
 
 def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -> list[InputError]:
     """Errors for unknown material names in raw values, where other errors prevent the case from being made."""
-    if any(each["loc"] == () for each in failure.errors()):
+    if any(report["loc"] == () for report in failure.errors()):
         return []
-    known, bed, column = (values.get(name) for name in ("material", "bed", "column"))
-    if not (isinstance(known, dict) and isinstance(bed, dict) and isinstance(column, dict)):
+    materials, bed, column = (values.get(name) for name in ("material", "bed", "column"))
+    if not (isinstance(materials, dict) and isinstance(bed, dict) and isinstance(column, dict)):
         return []
-    if dict not in map(type, known.values()):
+    if dict not in map(type, materials.values()):
         return []
     species = bed.get("species") or {"": bed}
     if not isinstance(species, dict):
         return []
-    tables = {f"bed.species.{name}" if name else "bed": each for name, each in species.items()}
-    named = {key: each.get("material") for key, each in tables.items() if isinstance(each, dict)}
+    tables = {f"bed.species.{name}" if name else "bed": table for name, table in species.items()}
+    named = {key: table.get("material") for key, table in tables.items() if isinstance(table, dict)}
     beds = {dotted([key]): name for key, name in named.items() if isinstance(name, str | None)}
     walls = column.get("material")
-    names = [dotted([each]) for each in known]
+    names = [dotted([name]) for name in materials]
     return list(unknown_materials(names, beds, walls if isinstance(walls, str) else None))

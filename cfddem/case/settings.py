@@ -56,13 +56,15 @@ def takes(kind: type[Settings]) -> Callable[[Callable[[Any], Result]], Callable[
         own = inspect.signature(function)
 
         @wraps(function)
-        def call(*given: Any, **values: Any) -> Result:
-            if len(given) > kind.by_place:
-                raise TypeError(f"{function.__name__}() takes {kind.by_place} positional arguments, {len(given)} given")
-            twice = set(names[: len(given)]) & set(values)
+        def call(*arguments: Any, **values: Any) -> Result:
+            if len(arguments) > kind.by_place:
+                raise TypeError(
+                    f"{function.__name__}() takes {kind.by_place} positional arguments, {len(arguments)} given"
+                )
+            twice = set(names[: len(arguments)]) & set(values)
             if twice:
                 raise TypeError(f"{function.__name__}() got multiple values for argument {min(twice)!r}")
-            return function(kind(**dict(zip(names, given)), **values))
+            return function(kind(**dict(zip(names, arguments)), **values))
 
         call.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
         head, gap, rest = (inspect.getdoc(function) or "").partition("\n\n")

@@ -196,33 +196,37 @@ class CaseTables(Checked):
     @property
     def fastest_inflow(self) -> float:
         """Highest superficial velocity over time through the floor, the jet or an inlet [m/s]."""
-        return max([self.bed.fastest_inflow, *(each.fastest for each in self.patches.values())])
+        return max([self.bed.fastest_inflow, *(patch.fastest for patch in self.patches.values())])
 
     @property
     def fastest_by_pressure(self) -> float:
         """Speed that the highest pressure of a patch gives free fluid up to the lowest, sqrt(2 dp / rho) [m/s]."""
-        found = [each.pressure or 0.0 for each in self.patch.values() if each.kind != "wall" and not each.brings]
-        found += [0.0] * (self.column.ends == "flow")  # of the lid
-        return math.sqrt(2.0 * (max(found) - min(found)) / self.around.density) if self.patch and found else 0.0
+        pressures = [
+            patch.pressure or 0.0 for patch in self.patch.values() if patch.kind != "wall" and not patch.brings
+        ]
+        pressures += [0.0] * (self.column.ends == "flow")  # of the lid
+        if not (self.patch and pressures):
+            return 0.0
+        return math.sqrt(2.0 * (max(pressures) - min(pressures)) / self.around.density)
 
     @property
     def patches(self) -> dict[str, CasePatch]:
         """The patches by name, with the velocities of those that have a mass flow."""
         density = self.around.density
         return {
-            name: each if each.mass_flow is None else each.by_velocity(density, open_area_of(self, each))
-            for name, each in self.patch.items()
+            name: patch if patch.mass_flow is None else patch.by_velocity(density, open_area_of(self, patch))
+            for name, patch in self.patch.items()
         }
 
     @property
     def openings(self) -> tuple[CasePatch, ...]:
         """Patches that are openings in the wall of the vessel; none without a vessel."""
-        return tuple(each for each in self.patch.values() if each.side not in ENDS) if self.vessel else ()
+        return tuple(patch for patch in self.patch.values() if patch.side not in ENDS) if self.vessel else ()
 
     @property
     def drains(self) -> dict[str, CasePatch]:
         """Patches through which particles leave, by name."""
-        return {name: each for name, each in self.patch.items() if each.particles == "leave"}
+        return {name: patch for name, patch in self.patch.items() if patch.particles == "leave"}
 
     def area_of(self, side: str) -> float:
         """Area of the floor, the lid, or a side of a box [m2]."""

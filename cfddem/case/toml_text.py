@@ -50,10 +50,10 @@ def parse(text: str, name: str) -> dict[str, Any]:
         raise InputError(name, None, "a case with lists and tables nested a few levels deep") from None
     except ValueError as failure:
         reason, _, where = str(failure).partition(" (at ")
-        found = re.match(r"line (\d+), column (\d+)", where)
-        place = f"{name}:{found[1]}" if found else name
-        where = f" in column {found[2]}" if found else ""
-        line = int(found[1]) if found else text.rstrip().count("\n") + 1
+        position = re.match(r"line (\d+), column (\d+)", where)
+        place = f"{name}:{position[1]}" if position else name
+        where = f" in column {position[2]}" if position else ""
+        line = int(position[1]) if position else text.rstrip().count("\n") + 1
         if reason.startswith("Cannot overwrite a value") or reason.endswith(" twice"):
             raise _given_twice(text, line, name) from None
         comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+)\s*(#.*)?", text.split("\n")[line - 1])
@@ -68,7 +68,7 @@ def _given_twice(text: str, line: int, name: str) -> InputError:
     """The error for a key in a line that an earlier line has given."""
     lines = text.split("\n")
     heads = not lines[line - 1].lstrip().startswith("[")
-    only = [each if k == line or (heads and each.lstrip().startswith("[")) else "" for k, each in enumerate(lines, 1)]
+    only = [row if k == line or (heads and row.lstrip().startswith("[")) else "" for k, row in enumerate(lines, 1)]
     key = next((key for key, at in key_lines("\n".join(only)).items() if at == line), ())
     first = key_lines(text).get(key)
     return InputError(f"{name}:{line}: {dotted(key)}", None, "given once", f"line {first} gives it, too")
@@ -104,5 +104,5 @@ def set_value(values: dict[str, Any], keys: list[str], value: Any, whole: str) -
 def _copied(value: Any) -> Any:
     """A value whose tables and lists are its own, so that a later key inside of it leaves the caller's as they are."""
     if isinstance(value, dict):
-        return {key: _copied(each) for key, each in value.items()}
-    return [_copied(each) for each in value] if type(value) is list else value
+        return {key: _copied(content) for key, content in value.items()}
+    return [_copied(element) for element in value] if type(value) is list else value

@@ -66,7 +66,7 @@ def start_places(case: CaseTables) -> Array:
     """Places where particles start: as given, or a lattice in their box, half a diameter from its faces (N, 3) [m]."""
     if case.bed.positions:
         return np.array(case.bed.positions, float)
-    corner, size = (np.array(each) for each in start_box(case))
+    corner, size = (np.array(corner_or_size) for corner_or_size in start_box(case))
     margin = np.minimum(0.5 * case.bed.largest_diameter, 0.45 * size)
     along = [np.linspace(low, high, 8) for low, high in zip(corner + margin, corner + size - margin)]
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -103,7 +103,7 @@ def on_the_wrong_side(case: CaseTables, number: int, positions: Array) -> tuple[
     wrong = np.flatnonzero(inside_surface(corners, positions) != wanted)
     if not len(wrong):
         return None
-    place = ", ".join(f"{each:.4g}" for each in positions[wrong[0]])
+    place = ", ".join(f"{coordinate:.4g}" for coordinate in positions[wrong[0]])
     others = f", and so are {len(wrong) - 1} more" if len(wrong) > 1 else ""
     why = f"at ({place}) m it is {'outside' if wanted else 'inside'}{others}"
     return int(wrong[0]), why, _remedy(case, number, wanted)

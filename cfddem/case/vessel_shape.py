@@ -168,14 +168,14 @@ class CaseVessel(Checked):
                 CaseWall(shape="plane", point=(*at, 0.0), normal=(*(middle - at), 0.0)) for at in sides.tolist()
             )
         x, y = 0.5 * column.size[0], 0.5 * column.size[1]
-        made, height = [], column.height
+        walls, height = [], column.height
         for (low, below), (high, above) in pairwise(self.line_in(column)):
             if low >= height:
                 break
             end = min(high, height)
             above = below + (above - below) * (end - low) / (high - low)
             place = {"point": (x, y, low), "length": end - low, "radius": below}
-            made.append(CaseWall(shape="cylinder", **place) if above == below else CaseWall(
+            walls.append(CaseWall(shape="cylinder", **place) if above == below else CaseWall(
                 shape="cone", top_radius=max(above, ROUND_OFF * column.width), **place
             ))  # fmt: skip
-        return tuple(made)
+        return tuple(walls)

@@ -85,7 +85,7 @@ def start_box_in(vessel: CaseVessel, column: Any, _: tuple[int, int]) -> tuple[P
 
 def _largest_rectangle(mask: np.ndarray) -> tuple[tuple[int, int], tuple[int, int]]:
     """Columns and rows, from and to, of the largest rectangle of true values of a mask (rows, columns)."""
-    best, found = 0, ((0, 0), (0, 0))
+    best, place = 0, ((0, 0), (0, 0))
     for first in range(len(mask)):
         every = np.ones(mask.shape[1], bool)
         for last in range(first, len(mask)):
@@ -96,8 +96,8 @@ def _largest_rectangle(mask: np.ndarray) -> tuple[tuple[int, int], tuple[int, in
             longest = int(np.argmax(edges[1::2] - edges[::2]))
             begin, end = int(edges[2 * longest]), int(edges[2 * longest + 1])
             if (end - begin) * (last + 1 - first) > best:
-                best, found = (end - begin) * (last + 1 - first), ((begin, end), (first, last + 1))
-    return found
+                best, place = (end - begin) * (last + 1 - first), ((begin, end), (first, last + 1))
+    return place
 
 
 @lru_cache(maxsize=8)
@@ -109,7 +109,7 @@ def _closed(vessel: CaseVessel, column: Any, _: tuple[int, int]) -> ClosedSurfac
         raise InputError("vessel.file", failure.value, failure.limit, failure.remedy) from None
     size = np.array(column.size)
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    ends = " to ".join(f"({', '.join(f'{each:.4g}' for each in corner)})" for corner in (low, high))
+    ends = " to ".join(f"({', '.join(f'{coordinate:.4g}' for coordinate in corner)})" for corner in (low, high))
     times = float((high - low).max() / size.max())
     if times > IN_MILLIMETRES or times < LEAST_SIZE:
         remedy = "scale = 0.001 reads a file in millimetres" if times > 1.0 else "scale is the unit of the file in m"

@@ -24,10 +24,10 @@ SIDES = 96
 def stamp(wall: Any) -> tuple[int, int]:
     """Time and size of the file of a wall or vessel, which tell whether it has changed; 0 without a file."""
     try:
-        found = os.stat(wall.file or "")
+        status = os.stat(wall.file or "")
     except (OSError, ValueError):
         return 0, 0
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(maxsize=8)
@@ -57,7 +57,7 @@ def _around(wall: CaseWall) -> Array:
     own = wall.radius or 0.0
     low = np.array(wall.point) + own * circle
     high = np.array(wall.point) + (wall.length or 0.0) * axis + (wall.top_radius or own) * circle
-    after = [np.roll(each, -1, axis=0) for each in (low, high)]
+    after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
     return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
 
 
