@@ -91,8 +91,8 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
     if bed.inlet == 0.0:
         return
     other = ", with smeared surfaces" if sharp else ""
-    for each in LIQUID if case.in_liquid else GAS:
-        yield each.name, each.value, "", each.note + other
+    for figure in LIQUID if case.in_liquid else GAS:
+        yield figure.name, figure.value, "", figure.note + other
     if case.in_liquid and case.laws.kernel_width != 1.5:
         note = f"over 1.5 d, glass beads{other}"
         yield "this kernel: granular temperature", between(BY_KERNEL, case.laws.kernel_width), "", note
@@ -101,8 +101,8 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
 def _is_no_plain_bed(case: Case) -> bool:
     """Whether particles leave the bed, or fluid enters through its sides."""
     patches = case.patches.values()
-    leave = bool(case.outlet) or any(each.particles == "leave" for each in patches)
-    return leave or any(each.kind == "inlet" and each.side not in ENDS for each in patches)
+    leave = bool(case.outlet) or any(patch.particles == "leave" for patch in patches)
+    return leave or any(patch.kind == "inlet" and patch.side not in ENDS for patch in patches)
 
 
 def widening(cell: float, surface: str) -> float:

@@ -83,10 +83,10 @@ def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
     drag = bed_drag(case)
     terminal = min(
         balance.terminal_velocity(
-            each.diameter, case.material_of(each).density, fluid.density, fluid.viscosity, drag_single.brown_lawler,
-            gravity,
+            species.diameter, case.material_of(species).density, fluid.density, fluid.viscosity,
+            drag_single.brown_lawler, gravity,
         )
-        for each in case.species.values()
+        for species in case.species.values()
     )  # fmt: skip
     onset = balance.reynolds_in_balance(number, packed, drag) * scale
     reynolds = (inlet or terminal) / scale
@@ -143,29 +143,29 @@ def bubbles(case: Case, bed: BedEstimate) -> bool:
 
 def _terminal_by_law(case: Case, gravity: float) -> float:
     """Terminal velocity of the slowest species alone by the drag law of the case; NaN if it has none for voidage 1."""
-    law, fluid, found = case.laws.drag_law, case.around, []
+    law, fluid, velocities = case.laws.drag_law, case.around, []
     if law is None or law.ranges.get("voidage", (0.0, 1.0))[1] < 1.0:
         return math.nan
-    for each in case.species.values():
-        drag = case.laws.drag_function(each.sauter_diameter / case.bed.diameter)
+    for species in case.species.values():
+        drag = case.laws.drag_function(species.sauter_diameter / case.bed.diameter)
         assert drag is not None
-        flow = each.diameter, case.material_of(each).density, fluid.density, fluid.viscosity
+        flow = species.diameter, case.material_of(species).density, fluid.density, fluid.viscosity
         with suppress(ArithmeticError, ValueError):  # a law of a user may have no value at voidage 1
-            found.append(balance.terminal_velocity(*flow, drag, gravity))
-    return min(found, default=math.nan)
+            velocities.append(balance.terminal_velocity(*flow, drag, gravity))
+    return min(velocities, default=math.nan)
 
 
 def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including jet and inlets, highest in time [m/s]."""
     if (case.column.ends != "flow" and not case.patch) or case.around is NO_FLUID:
         return 0.0
-    on_floor = [each for each in case.patches.values() if each.side == "floor"]
-    closed = case.column.ends != "flow" or any(not each.brings and each.shape == "whole" for each in on_floor)
+    on_floor = [patch for patch in case.patches.values() if patch.side == "floor"]
+    closed = case.column.ends != "flow" or any(not patch.brings and patch.shape == "whole" for patch in on_floor)
     inlet = 0.0 if closed else case.bed.highest_inlet_velocity
-    of_floor = [each for each in on_floor if each.brings]
+    of_floor = [patch for patch in on_floor if patch.brings]
     if of_floor:
-        shares = [open_area_of(case, each) / max(case.floor_area, 1e-300) for each in of_floor]
-        entering = sum(each.highest * share for each, share in zip(of_floor, shares))
+        shares = [open_area_of(case, patch) / max(case.floor_area, 1e-300) for patch in of_floor]
+        entering = sum(patch.highest * share for patch, share in zip(of_floor, shares))
         return entering + max(0.0, 1.0 - sum(shares)) * inlet
     return inlet + sum(share_of_jet(case, jet) * (jet.velocity - inlet) for jet in case.bed.jets)
 
@@ -210,8 +210,8 @@ def mean_drag(case: Case) -> Drag:
     x is the volume share of a species and y its diameter over the Sauter mean.
     """
     total, parts = sum(case.volumes.values()), []
-    for name, each in case.species.items():
-        ratio = each.sauter_diameter / case.bed.diameter
+    for name, species in case.species.items():
+        ratio = species.sauter_diameter / case.bed.diameter
         law = case.laws.drag_function(ratio)
         assert law is not None
         parts.append((case.volumes[name] / total, ratio, law))
@@ -238,10 +238,10 @@ def net_downward_forces(case: Case, inlet: float, voidage: float) -> dict[str, f
     if fluid.viscosity == 0.0 or gravity == 0.0:
         return forces
     bulk = (1.0 - voidage) * (case.solid_density - fluid.density)
-    for name, each in case.species.items():
-        diameter = each.sauter_diameter
+    for name, species in case.species.items():
+        diameter = species.sauter_diameter
         law = case.laws.drag_function(diameter / case.bed.diameter)
-        excess = case.material_of(each).density - fluid.density
+        excess = case.material_of(species).density - fluid.density
         if law is not None and excess != 0.0:
             reynolds = fluid.density * inlet * diameter / fluid.viscosity
             drag = 18.0 * fluid.viscosity * inlet * law(reynolds, voidage) / (diameter**2 * gravity)

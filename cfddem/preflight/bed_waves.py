@@ -73,44 +73,44 @@ class BedWaves:
         return math.exp(min(wave.growth * self.height / wave.speed, 700.0))
 
 
-def summary(found: BedWaves, count: int = 12) -> dict[str, Any]:
+def summary(waves: BedWaves, count: int = 12) -> dict[str, Any]:
     """The page of `cfddem stability` as plain values.
 
     count  number of wavelengths in the table
     """
     rows = []
-    for wavelength in found.wavelengths(count):
-        plain, on_cells = found.bed.wave(wavelength), found.on_cells(found.bed, wavelength)
-        agitated = found.on_cells(found.agitated, wavelength)
+    for wavelength in waves.wavelengths(count):
+        plain, on_cells = waves.bed.wave(wavelength), waves.on_cells(waves.bed, wavelength)
+        agitated = waves.on_cells(waves.agitated, wavelength)
         rows.append({
             "wavelength": wavelength, "speed": plain.speed, "growth": plain.growth, "on_cells": on_cells.growth,
             "agitated": agitated.growth,
         })  # fmt: skip
-    wavelength, wave = found.fastest(found.agitated)
-    bed = found.bed
+    wavelength, wave = waves.fastest(waves.agitated)
+    bed = waves.bed
     return {
         "voidage": bed.voidage, "slip": bed.slip(), "kernel": bed.kernel, "added_mass": bed.added_mass,
-        "granular_temperature": found.agitated.granular_temperature, "height": found.height, "cell": found.cell,
+        "granular_temperature": waves.agitated.granular_temperature, "height": waves.height, "cell": waves.cell,
         "waves": rows,
-        "fastest": {"wavelength": wavelength, **wave._asdict(), "amplification": found.amplification(wave)},
+        "fastest": {"wavelength": wavelength, **wave._asdict(), "amplification": waves.amplification(wave)},
     }  # fmt: skip
 
 
-def lines(found: BedWaves) -> list[str]:
+def lines(waves: BedWaves) -> list[str]:
     """The page of `cfddem stability` as text."""
-    made = summary(found)
-    agitated = made["granular_temperature"] > 0.0
-    kernel, added_mass = 1e3 * made["kernel"], made["added_mass"]
+    numbers = summary(waves)
+    agitated = numbers["granular_temperature"] > 0.0
+    kernel, added_mass = 1e3 * numbers["kernel"], numbers["added_mass"]
     out = [
-        f"Uniform bed: voidage {made['voidage']:.3f}, slip {made['slip']:.3g} m/s, kernel {kernel:.3g} mm, added mass "
-        f"{added_mass:.3g}"
+        f"Uniform bed: voidage {numbers['voidage']:.3f}, slip {numbers['slip']:.3g} m/s, kernel {kernel:.3g} mm, "
+        f"added mass {added_mass:.3g}"
     ]
     if agitated:
-        temperature = made["granular_temperature"]
-        share = temperature / made["slip"] ** 2
+        temperature = numbers["granular_temperature"]
+        share = temperature / numbers["slip"] ** 2
         out.append(f"Granular temperature by agitation: {temperature:.2g} m2/s2, {share:.2g} of the squared slip")
     rows: list[tuple[str, ...]] = [("mm", "m/s", "1/s", "1/s", "1/s")]
-    for row in made["waves"]:
+    for row in numbers["waves"]:
         rates = (f"{row[name]:.2f}" for name in ("growth", "on_cells", "agitated"))
         rows.append((f"{1e3 * row['wavelength']:.1f}", f"{row['speed']:.3f}", *rates))
     columns = 4 + agitated
@@ -118,18 +118,18 @@ def lines(found: BedWaves) -> list[str]:
     out += ["", *table([row[:columns] for row in rows], headings, right=range(columns), widths=(12, 9, 9, 9, 9))]
     meaning = "growth: by theory; on cells: less the damping of the cells"
     out += ["", meaning + "; agitated: on cells, with agitation" * agitated]
-    fastest = made["fastest"]
+    fastest = numbers["fastest"]
     verb = "grows" if fastest["growth"] > 0.0 else "decays"
     out += [
         "",
         f"The fastest wave is {1e3 * fastest['wavelength']:.1f} mm long, moves up at {fastest['speed']:.3f} m/s and "
         f"{verb} at {abs(fastest['growth']):.2f} 1/s.",
     ]
-    if math.isfinite(found.height):
+    if math.isfinite(waves.height):
         grown = fastest["amplification"]
         consequence = ", which breaks up into plugs" if grown > math.exp(WARN_AT) else ""
         out.append(
-            f"A disturbance grows {grown:.3g}-fold on its way through {1e3 * found.height:.0f} mm of bed{consequence}."
+            f"A disturbance grows {grown:.3g}-fold on its way through {1e3 * waves.height:.0f} mm of bed{consequence}."
         )
     return out
 
@@ -204,10 +204,10 @@ def with_agitation(bed: UniformBed, case: Case) -> UniformBed:
         return bed
     slip, solid = bed.slip(), 1.0 - bed.voidage
     reynolds = bed.voidage * bed.fluid_density * slip * bed.diameter / bed.viscosity
-    known = {"solid_fraction": solid, "reynolds": reynolds, "density_ratio": bed.density / bed.fluid_density}
+    values = {"solid_fraction": solid, "reynolds": reynolds, "density_ratio": bed.density / bed.fluid_density}
     variance = 0.0
     for weight, along, share in ((1.0, 1.0, factors.along), (2.0, 0.0, factors.across)):
-        arguments = {name: value for name, value in {**known, "along": along}.items() if name in law.arguments}
+        arguments = {name: value for name, value in {**values, "along": along}.items() if name in law.arguments}
         variance += weight / 3.0 * share**2 * law.function(**arguments) * slip**2
     added = bed.added_mass * bed.fluid_density
     relaxation = (bed.density + added) / bed.resistance(bed.voidage, slip)
@@ -218,11 +218,11 @@ def with_agitation(bed: UniformBed, case: Case) -> UniformBed:
 
 def check_waves(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Warn of a liquid bed without agitation in which waves grow strong before they reach its surface."""
-    found = waves_of(case, bed)
-    if found is None or case.agitation != "none" or math.isinf(found.height):
+    waves = waves_of(case, bed)
+    if waves is None or case.agitation != "none" or math.isinf(waves.height):
         return
-    wavelength, wave = found.fastest(found.bed)
-    grown = found.amplification(wave)
+    wavelength, wave = waves.fastest(waves.bed)
+    grown = waves.amplification(wave)
     if grown > math.exp(WARN_AT):
         beyond = outside(law_of(free_spheres), state_of(case, bed))
         beyond = f" ({beyond})" if beyond else ""

@@ -66,9 +66,9 @@ def find_issues(
     if too_large:
         return check_length(case, refused=True) or too_large
     scales = list(check_scales(case))
-    if any(each.severity == "error" for each in scales):
+    if any(issue.severity == "error" for issue in scales):
         return scales
-    found = [
+    issues = [
         *scales,
         *check_units(case),
         *check_bed_size(case, bed),
@@ -85,15 +85,15 @@ def find_issues(
         *check_cost(case, cost),
         *check_stiffness(case, bed, collision, cost),
         *check_data(case),
-        *(Issue(*each) for table in case.feature_tables for each in table.issues(case)),
-        *(Issue(*each) for table in case.feature_tables for each in table.issues_of_bed(case, bed)),
+        *(Issue(*fields) for table in case.feature_tables for fields in table.issues(case)),
+        *(Issue(*fields) for table in case.feature_tables for fields in table.issues_of_bed(case, bed)),
     ]
     if case.has_fluid:
-        found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
-        found += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
-        found += check_expansion(case, bed)
-    found.sort(key=lambda each: ORDER.index(each.severity))
-    return [*check_length(case, refused=any(each.severity == "error" for each in found)), *found]
+        issues += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
+        issues += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
+        issues += check_expansion(case, bed)
+    issues.sort(key=lambda issue: ORDER.index(issue.severity))
+    return [*check_length(case, refused=any(issue.severity == "error" for issue in issues)), *issues]
 
 
 def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) -> Iterator[Issue]:
@@ -105,7 +105,7 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
         "collisions at the reference speed": collision.overlap / species.diameter,
         "the weight of the bed": collision.resting_overlap / species.diameter,
     }
-    cause, part = max(causes.items(), key=lambda each: each[1])
+    cause, part = max(causes.items(), key=lambda cause_and_share: cause_and_share[1])
     if part <= SOFT_OVERLAP:
         return
     solid, carried = case.material_of(species), bed.inlet > bed.onset
@@ -167,7 +167,7 @@ def needed_modulus(case: Case, collision: CollisionEstimate) -> float:
     if math.isinf(max(parts)[0]):
         return math.inf
     softer = solid.contact_modulus or solid.youngs_modulus
-    return max(softer * (each / species.diameter / SOFT_OVERLAP) ** power for each, power in parts)
+    return max(softer * (overlap / species.diameter / SOFT_OVERLAP) ** power for overlap, power in parts)
 
 
 def check_surface_laws(case: Case) -> Iterator[Issue]:
@@ -190,33 +190,35 @@ def check_surface_laws(case: Case) -> Iterator[Issue]:
         ("rolling_resistance", laws.rolling_resistance, laws.rolling_resistance != "none", "rolling_friction"),
         ("contact", laws.contact, contact.takes("work_of_adhesion"), "surface_energy"),
     ):
-        given = [f"material.{name}.{needed}" for name, each in case.material.items() if getattr(each, needed) > 0.0]
+        keys = [
+            f"material.{name}.{needed}" for name, material in case.material.items() if getattr(material, needed) > 0.0
+        ]
         of_pair = "work_of_adhesion" if needed == "surface_energy" else needed
-        pairs = {f"pair.{a}.{b}.{of_pair}": each for a, row in case.pair.items() for b, each in row.items()}
-        given += [key for key, each in pairs.items() if getattr(each, of_pair)]
-        if used and not given:
+        pairs = {f"pair.{a}.{b}.{of_pair}": properties for a, row in case.pair.items() for b, properties in row.items()}
+        keys += [key for key, pair in pairs.items() if getattr(pair, of_pair)]
+        if used and not keys:
             yield Issue(
                 "warning", f"laws.{key}", f"the {needed} that {law} uses is 0 in every material",
                 f"set material.NAME.{needed}",
             )  # fmt: skip
-        if given and not used:
-            yield Issue("warning", given[0], f'unused, because laws.{key} is "{law}"', f"set laws.{key}")
+        if keys and not used:
+            yield Issue("warning", keys[0], f'unused, because laws.{key} is "{law}"', f"set laws.{key}")
 
 
 def check_steps(case: Case, steps: StepEstimate) -> Iterator[Issue]:
     """Check that the time step is stable and resolves a collision, and that averages begin before the end."""
-    given, scales = case.run.particle_step, steps.time_scales
+    step, scales = case.run.particle_step, steps.time_scales
     remedy = f"use {scales.recommended:.2g} s, or leave it out"
-    if given is not None and given > scales.limit and not case.bed.fixed:
+    if step is not None and step > scales.limit and not case.bed.fixed:
         yield Issue(
             "error", "run.particle_step",
-            f"{given:.3g} s is above the stability limit {scales.limit:.3g} s of the {scales.limiting} criterion",
+            f"{step:.3g} s is above the stability limit {scales.limit:.3g} s of the {scales.limiting} criterion",
             remedy,
         )  # fmt: skip
-    elif given is not None and given > LONG_STEP * scales.recommended:
+    elif step is not None and step > LONG_STEP * scales.recommended:
         yield Issue(
             "warning", "run.particle_step",
-            f"{given:.3g} s is stable, but more than {LONG_STEP:g} times the recommended {scales.recommended:.2g} s, "
+            f"{step:.3g} s is stable, but more than {LONG_STEP:g} times the recommended {scales.recommended:.2g} s, "
             "2 % of the Hertz time: rebounds are inaccurate by 0.5 % or more",
             remedy,
         )  # fmt: skip
@@ -302,15 +304,15 @@ def _error(key: str, failure: InputError) -> Issue:
 
 def _check_velocities(case: Case, key: str, points: Points) -> Iterator[Issue]:
     """Check that the case holds the velocities of measured points."""
-    found = held(case.bed.inlet_velocity, case.run.until, points.place)
-    if not found.all():
-        some = f"only {found.sum()} of" if found.any() else "none of"
-        missing = [f"{each:.3g}" for each in points.place[~found]]
+    are_held = held(case.bed.inlet_velocity, case.run.until, points.place)
+    if not are_held.all():
+        some = f"only {are_held.sum()} of" if are_held.any() else "none of"
+        missing = [f"{velocity:.3g}" for velocity in points.place[~are_held]]
         listed = ", ".join(missing[:5]) + " ..." * (len(missing) > 5)
-        values = ",".join(f"{each:.4g}" for each in sorted(set(points.place.tolist())))
+        values = ",".join(f"{velocity:.4g}" for velocity in sorted(set(points.place.tolist())))
         yield Issue(
-            "note" if found.any() else "warning", key,
-            f"the run is compared at {some} {len(found)} velocities; its inlet does not hold {listed} m/s",
+            "note" if are_held.any() else "warning", key,
+            f"the run is compared at {some} {len(are_held)} velocities; its inlet does not hold {listed} m/s",
             f"for all: cfddem sweep --over inlet_velocity={values}; or {steps_of(points.place, case.run.until)}",
-            not found.any(),
+            not are_held.any(),
         )  # fmt: skip

@@ -47,8 +47,8 @@ class CollisionEstimate:
 
 def estimate_collision(case: Case, bed: BedEstimate) -> CollisionEstimate:
     """Estimate a typical collision; in a mixture, for the species with the largest overlap over diameter."""
-    each = (_of_species(case, bed, name, species) for name, species in case.species.items())
-    return max(each, key=lambda found: found.overlap / case.species[found.species].diameter)
+    estimates = (_of_species(case, bed, name, species) for name, species in case.species.items())
+    return max(estimates, key=lambda estimate: estimate.overlap / case.species[estimate.species].diameter)
 
 
 def pair_row(case: Case, species: Species) -> np.void:
@@ -84,7 +84,9 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
         real_overlap=law.largest_overlap(mass, radius, hard, speed),
         resting_overlap=law.resting_overlap(mass, radius, row, load),
         softening=soft / real if law.takes("contact_modulus") else 1.0,
-        film_damping_rate=max(_film_rate(case, each, viscosity) for each in case.species.values()) if films else 0.0,
+        film_damping_rate=max(_film_rate(case, species, viscosity) for species in case.species.values())
+        if films
+        else 0.0,
     )
 
 

@@ -47,7 +47,7 @@ class Expansions:
     @property
     def held(self) -> tuple[Expansion, ...]:
         """Laws that hold at the bed's Re_t and d/D; all laws if none does."""
-        return tuple(each for each in self.every if not each.outside) or self.every
+        return tuple(expansion for expansion in self.every if not expansion.outside) or self.every
 
     @property
     def scattered(self) -> bool:
@@ -118,7 +118,7 @@ def expansions(case: Case) -> Expansions:
     between = laws_of_beds.expanded_voidage_hirata_bulos
     limit, exponent = ratio(bed.reynolds) * bed.beside_walls, laws_of_beds.exponent_two_parameters(bed.reynolds)
     packed = 1.0 - POURED_SOLID_FRACTION
-    voidage = {name: power(velocity, end, each) for name, (each, end) in expansion_exponents(case).items()} | {
+    voidage = {name: power(velocity, end, exponent) for name, (exponent, end) in expansion_exponents(case).items()} | {
         "Garside's slip form": voidage_of_slip(velocity / bed.beside_walls, partial(slip, reynolds=bed.reynolds)),
         "two-parameter Richardson-Zaki": power(velocity, limit, exponent),
         "Hirata-Bulos": between(velocity, bed.terminal, bed.reynolds, bed.wall, packed),
@@ -132,36 +132,38 @@ def expansions(case: Case) -> Expansions:
         "Hirata-Bulos": (between,),
     }
     return Expansions(
-        bed.reynolds, tuple(Expansion(name, each, _outside(ranges[name], bed)) for name, each in voidage.items())
+        bed.reynolds, tuple(Expansion(name, value, _outside(ranges[name], bed)) for name, value in voidage.items())
     )
 
 
 def _outside(functions: tuple[Law, ...], bed: _Column) -> str:
     """What of a bed lies outside of the ranges of functions, in words; empty if nothing does."""
-    found = []
+    reasons = []
     for function in functions:
         for name, (low, high) in law_of(function).ranges.items():
             value, shown = (bed.reynolds, "Re_t") if name == "reynolds" else (bed.wall, "d/D")
             if not low <= value <= high:
-                found.append(f"{shown} {value:.3g} is outside of {low:g} to {high:g}")
-    return "; ".join(found)
+                reasons.append(f"{shown} {value:.3g} is outside of {low:g} to {high:g}")
+    return "; ".join(reasons)
 
 
-def spread_in_words(found: Expansions) -> str:
+def spread_in_words(estimates: Expansions) -> str:
     """The scatter of published beds at this Re_t, in words; empty where they do not scatter."""
-    if not found.scattered:
+    if not estimates.scattered:
         return ""
     low, high = SCATTER
     beds = f"published beds scatter by {low:g} to {high:g} in voidage at Re_t above {SCATTERED:g}"
-    return f"{beds}, here {found.reynolds:.0f}"
+    return f"{beds}, here {estimates.reynolds:.0f}"
 
 
 def check_expansion(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Note that no published law is exact for a bed of coarse or heavy particles in a liquid."""
     if not (is_compared(case) and bed.inlet > bed.onset):
         return
-    found = expansions(case)
-    if found.scattered:
-        voidages = [each.voidage for each in found.held]
-        reason = f"{spread_in_words(found)}; their laws give {min(voidages):.3f} to {max(voidages):.3f} for this bed"
+    estimates = expansions(case)
+    if estimates.scattered:
+        voidages = [expansion.voidage for expansion in estimates.held]
+        reason = (
+            f"{spread_in_words(estimates)}; their laws give {min(voidages):.3f} to {max(voidages):.3f} for this bed"
+        )
         yield Issue("note", "bed.inlet_velocity", reason, "compare the bed height with the whole range", False)

@@ -146,11 +146,11 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
         yield Issue("warning", "laws.wall_drag", "unused, because the case has no fluid", "leave it out")
     for number, wall in enumerate(case.wall):
         if wall.shape in ("surface", "plate") or wall.moves:
-            what = f"is a {wall.shape}" if wall.shape in ("surface", "plate") else "moves"
-            yield Issue("error", "laws.wall_drag", f"wall.{number} {what}", 'set laws.wall_drag = "none"')
+            reason = f"is a {wall.shape}" if wall.shape in ("surface", "plate") else "moves"
+            yield Issue("error", "laws.wall_drag", f"wall.{number} {reason}", 'set laws.wall_drag = "none"')
     column = case.column
     pairs = column.ends, column.sides, column.sides if column.front is None else column.front
-    faces = 2 * sum(each != "periodic" for each in pairs) + len(case.wall)
+    faces = 2 * sum(pair != "periodic" for pair in pairs) + len(case.wall)
     if case.laws.wall_drag == "all" and case.has_fluid and faces > 1:
         yield Issue(
             "warning", "laws.wall_drag",
@@ -183,10 +183,10 @@ def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check the inlet velocity against minimum fluidisation and terminal velocity."""
     inlet = case.bed.inlet_velocity
-    of_floor = (f"patch.{name}" for name, each in case.patch.items() if (each.kind, each.side) == ("inlet", "floor"))
+    of_floor = (f"patch.{name}" for name, patch in case.patch.items() if (patch.kind, patch.side) == ("inlet", "floor"))
     key = next(of_floor, "bed.inlet_velocity")
     if case.laws.gravity[2] * (case.solid_density - case.required_fluid.density) > 0.0:
-        names = {case.material_name_of(each) for each in case.species.values()}
+        names = {case.material_name_of(species) for species in case.species.values()}
         yield Issue(
             "warning", f"material.{names.pop() if len(names) == 1 else 'NAME'}.density",
             f"particles float (mean {case.solid_density:.4g} kg/m3, fluid {case.required_fluid.density:.4g} kg/m3), "
@@ -214,7 +214,7 @@ def check_drag(case: Case) -> Iterator[Issue]:
     law = case.laws.drag_law
     if law is None or not case.resists:
         return
-    ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
+    ratios = [species.sauter_diameter / case.bed.diameter for species in case.species.values()]
     if max(ratios) > UNEQUAL * min(ratios) and "diameter_ratio" not in law.arguments:
         yield Issue(
             "warning", "laws.drag",

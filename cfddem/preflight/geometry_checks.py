@@ -121,8 +121,8 @@ def check_positions(case: Case) -> Iterator[Issue]:
         )  # fmt: skip
     for number, wall in enumerate(case.wall):
         with suppress(InputError, OSError, ValueError):
-            if (found := on_the_wrong_side(case, number, positions)) is not None:
-                row, why, remedy = found
+            if (misplaced := on_the_wrong_side(case, number, positions)) is not None:
+                row, why, remedy = misplaced
                 reason = f"wall.{number}.file = {wall.file!r} is closed, and {why}"
                 yield Issue("error", f"bed.positions.{row}", reason, remedy)
     overlap, rows = _largest_overlap(positions, case.bed.diameter)
@@ -211,7 +211,7 @@ def check_scales(case: Case) -> Iterator[Issue]:
         if not LARGE_SURFACE < times < 1e3 * FITTING:
             continue
         near = ((corners.min(axis=1) <= size) & (corners.max(axis=1) >= 0.0)).all(axis=1)
-        ends = " to ".join(f"({', '.join(f'{each:.4g}' for each in corner)})" for corner in (low, high))
+        ends = " to ".join(f"({', '.join(f'{coordinate:.4g}' for coordinate in corner)})" for corner in (low, high))
         where = "is" if near.any() else "lies outside the column and is"
         yield Issue(
             "warning" if near.any() else "error", f"wall.{number}.scale",

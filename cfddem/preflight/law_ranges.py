@@ -46,20 +46,20 @@ def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if law is None or not case.resists:
         return
     state = state_of(case, bed)
-    ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
-    if found := outside(law, state, ratios):
-        yield Issue("warning", "laws.drag", found + _and(effect_of_drag(case, law, bed)), REMEDY, False)
+    ratios = [species.sauter_diameter / case.bed.diameter for species in case.species.values()]
+    if reason := outside(law, state, ratios):
+        yield Issue("warning", "laws.drag", reason + _and(effect_of_drag(case, law, bed)), REMEDY, False)
     added, agitation = case.laws.added_mass_law, case.agitation
-    if isinstance(added, Law) and (found := outside(added, state, ratios)):
-        yield Issue("warning", "laws.added_mass", found + _and(_effect_of_added_mass(case, state)), REMEDY)
-    if isinstance(agitation, Law) and (found := outside(agitation, state)):
+    if isinstance(added, Law) and (reason := outside(added, state, ratios)):
+        yield Issue("warning", "laws.added_mass", reason + _and(_effect_of_added_mass(case, state)), REMEDY)
+    if isinstance(agitation, Law) and (reason := outside(agitation, state)):
         remedy = "; ".join(["trust heights more than granular temperatures", *by_default(case)])
-        yield Issue("note", "laws.agitation", found + _and(AGITATED), remedy, case.laws.agitation == "auto")
+        yield Issue("note", "laws.agitation", reason + _and(AGITATED), remedy, case.laws.agitation == "auto")
     if isinstance(agitation, Law) and agitation.name in TIMES and (added != 0.0 or case.laws.history != "none"):
         remedy = 'leave these forces out, or set laws.agitation = "none"'
         yield Issue("warning", "laws.agitation", f"{agitation.name} was {NOT_FITTED_WITH}", remedy)
-    if case.laws.lift and (found := outside(law_of(saffman_mei), state)):
-        yield Issue("warning", "laws.lift", found + _and(_effect_of_lift(case, bed)), "set it to false")
+    if case.laws.lift and (reason := outside(law_of(saffman_mei), state)):
+        yield Issue("warning", "laws.lift", reason + _and(_effect_of_lift(case, bed)), "set it to false")
 
 
 def by_default(case: Case) -> list[str]:
@@ -83,7 +83,7 @@ def outside(law: Law, state: Mapping[str, float], diameter_ratios: Sequence[floa
     if ignores_voidage(law) and state["voidage"] < DILUTE:
         return f"{law.name} is for single spheres, but the bed has a voidage of {state['voidage']:.3g}"
     ranges, values = [], []
-    for name, value in (*state.items(), *(("diameter_ratio", each) for each in diameter_ratios)):
+    for name, value in (*state.items(), *(("diameter_ratio", ratio) for ratio in diameter_ratios)):
         low, high = law.ranges.get(name, (-math.inf, math.inf))
         if value < low or value > high:  # a value that is not known, NaN, is neither
             ranges.append(f"{name} {low:g} to {high:g}")
@@ -111,7 +111,7 @@ def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
     if not others:
         return "no other law was fitted here, so that the error is not known"
     at = (state["reynolds"], state["voidage"])
-    drag = _spread([drag_by_name(law)(*at) / each.function(*at) for each in others])
+    drag = _spread([drag_by_name(law)(*at) / other.function(*at) for other in others])
     count = (
         f"the median of the {len(others)} built-in laws"
         if len(others) > 1
@@ -123,7 +123,7 @@ def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
     if (ignores_voidage(law) and state["voidage"] < DILUTE) or (bed.inlet > 0.0 and state["voidage"] >= 1.0):
         return text
     name, own = _result(case, bed, law, state)
-    result = [own / each for other in others if (each := _result(case, bed, other, state)[1]) > 0.0]
+    result = [own / value for other in others if (value := _result(case, bed, other, state)[1]) > 0.0]
     return f"{text}, and the {name} by {_spread(result)}" if own > 0.0 and result else text
 
 
@@ -137,9 +137,9 @@ def effect_of_bridge(angle: float, radius: float, volume: float, rupture: float)
     """
     at = (1.0, angle, radius, volume, rupture)
     own, others = willett_energy(*at), (lambert_energy(*at), rabinovich_energy(*at))
-    if not all(each > 0.0 for each in (own, *others)):
+    if not all(number > 0.0 for number in (own, *others)):
         return ""
-    lambert, rabinovich = (f"{100.0 * (own / each - 1.0):+.0f} %" for each in others)
+    lambert, rabinovich = (f"{100.0 * (own / other - 1.0):+.0f} %" for other in others)
     return f"; its energy differs by {lambert} from that by Lambert and by {rabinovich} from that by Rabinovich"
 
 
@@ -152,9 +152,9 @@ def _fitted_here(law: Law, state: Mapping[str, float]) -> list[Law]:
     """Other built-in laws of drag whose ranges hold the state."""
     load_built_in_laws()
     return [
-        each
-        for each in REGISTRY["drag"].values()
-        if each is not law and is_built_in(each.function) and _is_plain(each) and not outside(each, state)
+        other
+        for other in REGISTRY["drag"].values()
+        if other is not law and is_built_in(other.function) and _is_plain(other) and not outside(other, state)
     ]
 
 
@@ -185,7 +185,7 @@ def _effect_of_lift(case: Case, bed: BedEstimate) -> str:
 
 def _spread(ratios: list[float]) -> str:
     """The median of ratios as per cent below or above 1, and their range."""
-    middle, low, high = (f"{100.0 * (each - 1.0):+.0f}" for each in (median(ratios), min(ratios), max(ratios)))
+    middle, low, high = (f"{100.0 * (ratio - 1.0):+.0f}" for ratio in (median(ratios), min(ratios), max(ratios)))
     return f"{middle} %" if low == high else f"{middle} % (single laws {low} to {high} %)"
 
 

@@ -59,11 +59,11 @@ def overview(
         *_species(case, bed),
         *_collisions_and_film(case, collision, steps.particle),
         *_bridges(wet),
-        *(Row(*each) for table in case.feature_tables for each in table.numbers(case, bed)),
+        *(Row(*fields) for table in case.feature_tables for fields in table.numbers(case, bed)),
         *_equipment(case, bed),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),
-        *(Row("accuracy, where it was measured", *each) for each in accuracy(case, bed, steps)),
+        *(Row("accuracy, where it was measured", *fields) for fields in accuracy(case, bed, steps)),
         *_cost(cost),
     )
 
@@ -101,10 +101,10 @@ def _species(case: Case, bed: BedEstimate) -> Iterator[Row]:
         return
     group, total = "species", sum(case.volumes.values())
     forces = net_downward_forces(case, bed.inlet, bed.voidage) if bed.inlet > bed.onset else {}
-    for name, each in case.species.items():
+    for name, species in case.species.items():
         yield Row(group, f"{name}: particles", case.counts[name])
         yield Row(group, f"{name}: volume share", case.volumes[name] / total)
-        yield Row(group, f"{name}: diameter / mean", each.sauter_diameter / case.bed.diameter, "", "Sauter means")
+        yield Row(group, f"{name}: diameter / mean", species.sauter_diameter / case.bed.diameter, "", "Sauter means")
         if name in forces:
             note = f"{'sinks' if forces[name] > 0.0 else 'rises'} in the homogeneous mixture"
             yield Row(group, f"{name}: net force / weight", forces[name], "", note)
@@ -222,7 +222,7 @@ def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[
     if steps.cells is None or math.isinf(steps.fluid):
         return
     yield Row(group, "fluid step", steps.fluid, "s", f"set by the {steps.limiting} criterion")
-    for name, limit in sorted(steps.limits.items(), key=lambda each: each[1]):
+    for name, limit in sorted(steps.limits.items(), key=lambda name_and_limit: name_and_limit[1]):
         yield Row(group, f"{name} criterion", limit, "s", "limits the fluid step" * (name == steps.limiting))
     if not case.bed.fixed:
         yield Row(group, "particle steps per fluid step", steps.substeps)

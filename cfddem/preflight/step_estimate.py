@@ -45,9 +45,9 @@ class StepEstimate:
 def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     """Estimate the time steps of a case at its start."""
     run, speed = case.run, max(case.reference_speed, 1e-12)
-    every = [_time_scales(case, each, speed) for each in case.species.values()]
-    shortest = min(every, key=lambda each: each.recommended)
-    at_rest = case.bed.fixed or any(each.holds_particles for each in case.feature_tables)
+    every = [_time_scales(case, species, speed) for species in case.species.values()]
+    shortest = min(every, key=lambda scales: scales.recommended)
+    at_rest = case.bed.fixed or any(table.holds_particles for table in case.feature_tables)
     particle = math.inf if at_rest else run.particle_step or shortest.recommended
     if not case.has_fluid:
         return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)

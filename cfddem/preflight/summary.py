@@ -55,17 +55,17 @@ class Preflight:
     @property
     def status(self) -> Literal["ok", "warning", "error"]:
         """Severity of the worst error or warning; ok if there is none."""
-        severities = {each.severity for each in self.issues}
+        severities = {issue.severity for issue in self.issues}
         return "error" if "error" in severities else "warning" if "warning" in severities else "ok"
 
     @property
     def to_act_on(self) -> tuple[Issue, ...]:
         """Errors and warnings; notes need no action."""
-        return tuple(each for each in self.issues if each.severity != "note")
+        return tuple(issue for issue in self.issues if issue.severity != "note")
 
-    def with_errors(self, found: Iterable[Issue]) -> Preflight:
+    def with_errors(self, errors: Iterable[Issue]) -> Preflight:
         """The result with further errors."""
-        return replace(self, issues=(*found, *self.issues))
+        return replace(self, issues=(*errors, *self.issues))
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -76,7 +76,7 @@ class Preflight:
         for row in self.rows:
             value = row.value if math.isfinite(row.value) else None
             groups.setdefault(row.group, {})[row.name] = {"value": value, "unit": row.unit, "note": row.note}
-        issues = [asdict(each) for each in self.issues]
+        issues = [asdict(issue) for issue in self.issues]
         return {"case": self.title, "status": self.status, "issues": issues, "numbers": groups}
 
     def lines(self) -> list[str]:
@@ -91,14 +91,16 @@ class Preflight:
 
     def _repr_html_(self) -> str:
         """All numbers, errors and warnings, in a notebook."""
-        issues: list[tuple[str, ...]] = [(each.severity, each.key, each.reason, each.remedy) for each in self.issues]
-        numbers: list[tuple[str, ...]] = [(each.name, f"{each.value:.4g}", each.unit, each.note) for each in self.rows]
+        issues: list[tuple[str, ...]] = [
+            (issue.severity, issue.key, issue.reason, issue.remedy) for issue in self.issues
+        ]
+        numbers: list[tuple[str, ...]] = [(row.name, f"{row.value:.4g}", row.unit, row.note) for row in self.rows]
         return html.table(f"{self.title}: {self.status}", issues + numbers)
 
     def issue_lines(self) -> list[str]:
         """Errors, warnings and notes as text, at most 100 columns wide."""
-        found = [line for each in self.issues for line in each.lines()]
-        return [*found, "ok: no errors, no warnings"] if self.status == "ok" else found
+        lines = [line for issue in self.issues for line in issue.lines()]
+        return [*lines, "ok: no errors, no warnings"] if self.status == "ok" else lines
 
 
 def preflight(case: Case) -> Preflight:
@@ -127,7 +129,7 @@ def _preflight(case: Case, title: str) -> Preflight:
     if not SMALLEST <= abs(value) <= LARGEST:
         return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))
     own = list(check_own_laws(case))
-    if any(each.severity == "error" for each in own):
+    if any(issue.severity == "error" for issue in own):
         return Preflight(title, (), tuple(own))
     try:
         cell_counts(case.column.size, case.column.cell)  # also of a dry case, whose history is kept by cells
@@ -137,7 +139,7 @@ def _preflight(case: Case, title: str) -> Preflight:
         steps = estimate_steps(case, bed)
         cost = estimate_cost(case, bed, steps)
         issues = find_issues(case, bed, collision, wet, steps, cost)
-        issues = sorted([*issues, *own], key=lambda each: ORDER.index(each.severity))
+        issues = sorted([*issues, *own], key=lambda issue: ORDER.index(issue.severity))
         rows = overview(case, bed, collision, wet, steps, cost) if fits(case) else ()  # else they mean nothing
         return Preflight(title, rows, tuple(issues))
     except InputError as failure:
@@ -178,18 +180,18 @@ def most_extreme(case: Case) -> tuple[str, float]:
     numbers = [
         (key, value) for key, value in _numbers(case.model_dump(), ()) if value != 0.0 and not key.endswith("seed")
     ]
-    return max(numbers, key=lambda each: abs(math.log10(abs(each[1]))))
+    return max(numbers, key=lambda key_and_value: abs(math.log10(abs(key_and_value[1]))))
 
 
 def _numbers(values: Any, key: tuple[str, ...]) -> Iterator[tuple[str, float]]:
     """Every number of nested values, with its key."""
     if isinstance(values, Mapping):
-        for name, each in values.items():
-            yield from _numbers(each, (*key, str(name)))
+        for name, value in values.items():
+            yield from _numbers(value, (*key, str(name)))
     elif isinstance(values, list | tuple):
-        for number, each in enumerate(values):
-            if not (isinstance(each, float) and abs(each) < SMALLEST):  # a component is 0 up to rounding
-                yield from _numbers(each, (*key, str(number)) if isinstance(each, Mapping) else key)
+        for number, value in enumerate(values):
+            if not (isinstance(value, float) and abs(value) < SMALLEST):  # a component is 0 up to rounding
+                yield from _numbers(value, (*key, str(number)) if isinstance(value, Mapping) else key)
     elif isinstance(values, int | float) and not isinstance(values, bool):
         yield ".".join(key), float(values) if abs(values) < 10**308 else math.inf
 
@@ -200,7 +202,7 @@ def refuse_errors(case: Case) -> Preflight:
     Raises PreflightError with all errors otherwise.
     """
     result = preflight(case)
-    errors = tuple(each for each in result.issues if each.severity == "error")
+    errors = tuple(issue for issue in result.issues if issue.severity == "error")
     if errors:
         failure = PreflightError("\n".join(map(str, errors)))
         failure.issues = errors

@@ -52,7 +52,7 @@ def check_vessel(case: Case) -> Iterator[Issue]:
 
 def check_patches(case: Case) -> Iterator[Issue]:
     """Check that patches lie on the open part of floor or lid, and that cells resolve openings in a vessel."""
-    of_lid = {name: each for name, each in case.patch.items() if each.side == "lid"}
+    of_lid = {name: patch for name, patch in case.patch.items() if patch.side == "lid"}
     leaves = case.column.ends == "flow" and _is_open(case, [*of_lid.values()])
     if case.fastest_inflow > 0.0 and of_lid and not leaves and "outlet" not in {e.kind for e in case.patch.values()}:
         yield Issue(
@@ -93,7 +93,7 @@ def _check_drain(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
     narrow = min(patch.size or (math.inf,))
     if patch.diameter:
         narrow = 0.5 * (patch.diameter - patch.inner_diameter) if patch.inner_diameter else patch.diameter
-    smallest = min(each.smallest_diameter for each in case.species.values())
+    smallest = min(species.smallest_diameter for species in case.species.values())
     largest = case.bed.largest_diameter
     if patch.particles == "leave" and narrow <= largest:
         none = narrow <= smallest
@@ -122,8 +122,8 @@ def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:
     """Whether patches leave some of the lid free."""
     width, depth, _ = case.column.size
     along = (np.arange(PLACES) + 0.5) / PLACES
-    x, y = (each.reshape(-1) for each in np.meshgrid(width * along, depth * along))
+    x, y = (coordinate.reshape(-1) for coordinate in np.meshgrid(width * along, depth * along))
     free = on_the_side(case, "lid", x, y)
-    for each in patches:
-        free &= each.weight(x, y, (0.5 * width, 0.5 * depth)) == 0.0
+    for patch in patches:
+        free &= patch.weight(x, y, (0.5 * width, 0.5 * depth)) == 0.0
     return bool(free.any())

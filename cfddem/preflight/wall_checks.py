@@ -70,13 +70,13 @@ def check_walls_and_feeds(case: Case) -> Iterator[Issue]:
 
 def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
     if wall.shape == "surface":
-        found = list(_check_surface(case, wall, key))
-        yield from found
-        if any(each.severity == "error" for each in found):
+        issues = list(_check_surface(case, wall, key))
+        yield from issues
+        if any(issue.severity == "error" for issue in issues):
             return
     yield from _check_place(case, wall, key)
     ends = {"radius": wall.radius or 0.0, "top_radius": wall.top_radius or 0.0}
-    narrow = min(ends, key=lambda each: ends[each])
+    narrow = min(ends, key=lambda end: ends[end])
     opening = 2.0 * ends[narrow] if wall.shape == "cone" and wall.solid != "inside" else 0.0
     if 0.0 < opening < case.bed.largest_diameter:
         yield Issue(
@@ -138,7 +138,7 @@ def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         yield Issue("error", f"{key}.file", f"{wall.file}: {why}", "paths are relative to the case file")
         return
     edge = float(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1).mean())
-    smallest = min(each.smallest_diameter for each in case.species.values())
+    smallest = min(species.smallest_diameter for species in case.species.values())
     if len(corners) > MANY_TRIANGLES:
         yield Issue(
             "error" if len(corners) > MOST_TRIANGLES else "warning", f"{key}.file",
@@ -180,7 +180,7 @@ def _check_place(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
     box = extent(wall)
     if box is not None:
         if (box[0] > size).any() or (box[1] < 0.0).any():
-            low, high = (", ".join(f"{each:.4g}" for each in corner) for corner in box)
+            low, high = (", ".join(f"{coordinate:.4g}" for coordinate in corner) for corner in box)
             yield Issue(
                 "error", f"{key}.point", f"the wall, from ({low}) to ({high}) m, lies outside the column",
                 f"the column extends from 0 to {case.column.size} m",
@@ -307,7 +307,7 @@ def largest_rate(case: Case, feed: CaseFeed) -> float:
     """Particles per second that leave the box of a feed in time to make room for others, about [1/s]."""
     species = fed_species(case, feed)
     room = [edge + species.diameter for edge in feed.size]
-    held = max(1.0, LOOSE * math.prod(room) / species.mean_volume)
+    most = max(1.0, LOOSE * math.prod(room) / species.mean_volume)
     times = []
     for length, speed, pull in zip(room, feed.velocity, case.laws.gravity):
         along = abs(speed) if speed * pull >= 0.0 else 0.0
@@ -315,7 +315,7 @@ def largest_rate(case: Case, feed: CaseFeed) -> float:
             times.append((math.sqrt(along**2 + 2.0 * abs(pull) * length) - along) / abs(pull))
         elif along:
             times.append(length / along)
-    return held / max(min(times, default=math.inf), 1e-300)
+    return most / max(min(times, default=math.inf), 1e-300)
 
 
 def _check_outlets(case: Case) -> Iterator[Issue]:

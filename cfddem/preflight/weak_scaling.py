@@ -82,28 +82,28 @@ def weak_scaling(
     >>> round(weak_scaling(64e6, 64, shape=(64, 1, 1)).efficiency, 2)
     0.79
     """
-    given, owned = machine or Machine(), particles / ranks
+    computer, owned = machine or Machine(), particles / ranks
     volume = particles * math.pi / (6.0 * RANDOM_PACKING)  # in cubes of the diameter
     side = (volume / aspect) ** (1.0 / 3.0)
     edges = np.array([aspect * side, side, side])
 
-    def ghosts_of(each: Shape) -> float:
+    def ghosts_of(shape: Shape) -> float:
         """Ghosts of the rank that has most."""
-        sides = np.minimum(np.array(each) - 1, 2)
-        around = float(np.prod(1.0 + sides * reach * np.array(each) / edges))
+        sides = np.minimum(np.array(shape) - 1, 2)
+        around = float(np.prod(1.0 + sides * reach * np.array(shape) / edges))
         return min((around - 1.0) * owned, particles - owned)
 
     best = shape or min(shapes(ranks, (ranks, ranks, ranks)), key=ghosts_of)
     ghosts = ghosts_of(best)
-    work = given.particle_step * (owned + 0.5 * ghosts)
+    work = computer.particle_step * (owned + 0.5 * ghosts)
     exchange = 0.0
     if ranks > 1:
         beside = math.prod(min(n, 3) for n in best) - 1
-        halo = given.messages * beside * given.latency + ghosts * given.message / given.bandwidth
-        exchange = halo + given.reduction * math.log2(ranks)
+        halo = computer.messages * beside * computer.latency + ghosts * computer.message / computer.bandwidth
+        exchange = halo + computer.reduction * math.log2(ranks)
     step = work + exchange
     memory = BYTES_PER_PARTICLE * (owned + ghosts)
-    return Scaling(step, exchange / step, given.particle_step * owned / step, owned, ghosts, memory, best)
+    return Scaling(step, exchange / step, computer.particle_step * owned / step, owned, ghosts, memory, best)
 
 
 CALL = 25e-6
@@ -171,13 +171,13 @@ def time_of_a_rank(cost: RunCost, shares: Shares, machine: Machine | None = None
     machine  l, B, r and b; see `Machine`
     returns  the share of the work, and what is added to it, which is 0 in one process
     """
-    given, ranks = machine or Machine(), math.prod(shares.shape)
+    computer, ranks = machine or Machine(), math.prod(shares.shape)
     work, cells = cost.seconds / ranks, cost.cell_seconds / ranks
     beside = math.prod(min(n, 3) for n in shares.shape) - 1
-    reduction, many = given.reduction * math.log2(ranks) + CALL, float(ranks > 1)
+    reduction, many = computer.reduction * math.log2(ranks) + CALL, float(ranks > 1)
     exchanges, sums = WITH_FILMS if cost.films else DRY
     ghosts = (shares.particles - 1.0) * cost.particles / ranks
-    messages = exchanges * (beside * given.latency + CALL) + ghosts * given.message / given.bandwidth
+    messages = exchanges * (beside * computer.latency + CALL) + ghosts * computer.message / computer.bandwidth
     divided = sum(n > 1 for n in shares.shape)
     return {
         "work": work,
@@ -185,7 +185,7 @@ def time_of_a_rank(cost: RunCost, shares: Shares, machine: Machine | None = None
         "uneven cells, and ghosts": (shares.cells - 1.0) * cells,
         "messages of particles": many * cost.particle_steps * messages,
         "sums in particle steps": many * cost.particle_steps * sums * reduction,
-        "messages of cells": cost.fluid_steps * HALOS * divided * (2.0 * given.latency + CALL),
+        "messages of cells": cost.fluid_steps * HALOS * divided * (2.0 * computer.latency + CALL),
         "sums in fluid steps": many * cost.fluid_steps * SUMS * reduction,
     }
 

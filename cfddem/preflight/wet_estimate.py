@@ -183,8 +183,8 @@ def _content(case: Case, liquid: Liquid) -> float:
     """Volume of liquid at the start over that of the particles [-]."""
     counts = case.counts
     total = sum(
-        counts[name] * float(liquid.volume_on(np.array([0.5 * each.mean_power(3) ** (1.0 / 3.0)]))[0])
-        for name, each in case.species.items()
+        counts[name] * float(liquid.volume_on(np.array([0.5 * species.mean_power(3) ** (1.0 / 3.0)]))[0])
+        for name, species in case.species.items()
     )
     return liquid.share_of_wet_particles * total / sum(case.volumes.values())
 
