@@ -83,7 +83,7 @@ def parts_of(
     dry, cells = not case.has_fluid, cells_of(case, spheres.position, communicator)
     division = space_of(case, spheres.position, communicator, cells)
     if division is not None:
-        wrap(spheres.position, np.array([math.inf if each is None else each for each in periodic_box(case)]))
+        wrap(spheres.position, np.array([math.inf if length is None else length for length in periodic_box(case)]))
         spheres = handed_out(spheres, division, communicator)
     solver = ParticleSolver(
         spheres,
@@ -109,14 +109,14 @@ def parts_of(
 
 def _made(case: Case, table: np.ndarray, walls: list[Wall], laws: Laws, communicator: Communicator) -> Particles:
     """The particles of a case at the start, all of them on rank 0."""
-    made = list[Particles]()
+    on_this_rank = list[Particles]()
 
     def no_rows() -> Particles:
-        made.append(particles_of(case, table, walls, laws))
-        return made[0].copy(slice(0))
+        on_this_rank.append(particles_of(case, table, walls, laws))
+        return on_this_rank[0].copy(slice(0))
 
     fields = communicator.by_first(no_rows)
-    return made[0] if made else fields
+    return on_this_rank[0] if on_this_rank else fields
 
 
 def flow_of(
@@ -166,7 +166,7 @@ def kernels_of(case: Case) -> list[tuple[float, float]]:
     """Radius and standard deviation of the kernel of each size of particles, ascending [m]; empty for one size."""
     if case.laws.kernel_width == 0.0:
         return []
-    kinds = [each.sizes or [(each.diameter, 1.0)] for each in case.species.values()]
+    kinds = [species.sizes or [(species.diameter, 1.0)] for species in case.species.values()]
     diameters, largest = sorted({diameter for kind in kinds for diameter, _ in kind}, reverse=True), list[float]()
     for diameter in diameters:
         if not largest or largest[-1] >= APART * diameter:
@@ -260,15 +260,15 @@ def _bond_of(bond: Bond | None) -> BondLaw | None:
     """Law of the solid bonds of dry bridges; None if these break."""
     if bond is None:
         return None
-    given = bond.model_dump()
-    return BondLaw(**given | {"shear_strength": bond.shear_strength or bond.tensile_strength})
+    strengths = bond.model_dump()
+    return BondLaw(**strengths | {"shear_strength": bond.shear_strength or bond.tensile_strength})
 
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Corners of the box that no centre may leave; infinite along periodic directions [m]."""
     repeats, size = periodic_directions(case), case.column.size
-    low = tuple(-math.inf if each else 0.0 for each in repeats)
-    high = tuple(math.inf if each else length for each, length in zip(repeats, size))
+    low = tuple(-math.inf if is_periodic else 0.0 for is_periodic in repeats)
+    high = tuple(math.inf if is_periodic else length for is_periodic, length in zip(repeats, size))
     return low, high  # type: ignore[return-value]
 
 

@@ -75,7 +75,7 @@ def _rows(case: Case, ranks: int, shape: Shape | None) -> Iterator[Row]:
     if case.fluid:
         yield Row(group, "most / mean cells", shares.cells, "", "with a layer around them")
     spent = time_of_a_rank(cost, shares)
-    lost, total = max((each for each in spent if each != "work"), key=spent.__getitem__), sum(spent.values())
+    lost, total = max((part for part in spent if part != "work"), key=spent.__getitem__), sum(spent.values())
     yield Row(group, "efficiency", efficiency(cost, shares), "", "speed-up over ranks, by the model")
     yield Row(group, "largest loss", spent[lost] / total, "", f"of the time: {lost}")
     for name, value, unit, note in _inputs(cost):

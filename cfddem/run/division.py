@@ -132,6 +132,6 @@ def _expected(case: Case, position: np.ndarray) -> np.ndarray:
 
 def _sample(case: Case, ranks: int) -> np.ndarray:
     """Places spread evenly over the column (n, 3) [m]."""
-    least, each, most = SAMPLE
-    places = np.arange(min(max(least, each * ranks), most))[:, None] * SPREAD % 1.0 * case.column.size
+    least, for_rank, most = SAMPLE
+    places = np.arange(min(max(least, for_rank * ranks), most))[:, None] * SPREAD % 1.0 * case.column.size
     return places[case.beyond_the_side(places) <= 0.0]

@@ -100,38 +100,38 @@ def forget(name: str) -> None:
 
 def all_columns(case: Case) -> dict[str, Quantity]:
     """Unit and meaning of every column of the history of a case."""
-    found = {"time": TIME}
-    for each in MEASURES.values():
-        found |= each.columns(case)
-    return found
+    columns = {"time": TIME}
+    for measure in MEASURES.values():
+        columns |= measure.columns(case)
+    return columns
 
 
 def units_of(case: Case) -> dict[str, str]:
     """Unit of every column of the history of a case."""
-    return {name: each.unit for name, each in all_columns(case).items()}
+    return {name: quantity.unit for name, quantity in all_columns(case).items()}
 
 
 def require_shared(case: Case, ranks: int) -> None:
     """Refuse measures of a user that do not say that they are right on several ranks."""
-    for name, each in MEASURES.items():
-        if ranks > 1 and name not in _BUILT_IN and not each.shared and each.columns(case):
+    for name, measure in MEASURES.items():
+        if ranks > 1 and name not in _BUILT_IN and not measure.shared and measure.columns(case):
             remedy = "declare it with @measure(unit, shared=True) if it is"
             raise InputError("measure", name, "right on several ranks", remedy)
 
 
 def row(simulation: Simulation) -> dict[str, float]:
     """One row of the history: the time, and every measure of the present state."""
-    found = {"time": simulation.time}
-    for each in MEASURES.values():
-        if each.columns(simulation.case):
-            found |= each.values(simulation)
-    return found
+    values = {"time": simulation.time}
+    for measure in MEASURES.values():
+        if measure.columns(simulation.case):
+            values |= measure.values(simulation)
+    return values
 
 
-def _declare(name: str, made: Measure) -> None:
+def _declare(name: str, measure: Measure) -> None:
     if name in _BUILT_IN:
         raise InputError("measure", name, "a new name", "a built-in measure has this name")
-    MEASURES[name] = made
+    MEASURES[name] = measure
 
 
 # ---------------------------------------------------------------- kinds of cases
@@ -328,8 +328,8 @@ def momentum_imbalance(simulation: Simulation) -> float:
     fluid, particles, total = simulation.fluid, simulation.owned, simulation.communicator.sum
     # walls, inlets and outlets belong to neither of the two sums
     received = np.concatenate([particles.drag_impulse, simulation.coupling.exchanged_impulse])
-    given, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(received, axis=0)
-    return max(abs(part) for part in given + got) / max(total(np.abs(particles.drag_impulse)), 1e-300)
+    sent, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(received, axis=0)
+    return max(abs(part) for part in sent + got) / max(total(np.abs(particles.drag_impulse)), 1e-300)
 
 
 @measure("1", group="imbalance", when=_has_fluid)

@@ -66,20 +66,20 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     else:
         places = _suspended(len(diameters), float(diameters.max()), case, walls)
     places = in_the_box(places, case)
-    made = make_bodies(
+    particles = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
         material=properties.material,
         viscosity=case.around.viscosity_at(places[:, 2]), fixed=bed.fixed,
     )  # fmt: skip
     if bed.species:
-        made.declare(SPECIES, properties.species)
+        particles.declare(SPECIES, properties.species)
     if case.liquid is not None:
-        made.declare(LIQUID, liquid_of(case.liquid, made.radius, bed.seed))
-    _must_be_inside(made.position, case)
+        particles.declare(LIQUID, liquid_of(case.liquid, particles.radius, bed.seed))
+    _must_be_inside(particles.position, case)
     if case.wall or (case.vessel and bed.start != "poured"):
-        _must_be_apart(made, walls, len(walls) - len(case.wall))
-        _must_be_on_one_side(case, made.position)
-    return made
+        _must_be_apart(particles, walls, len(walls) - len(case.wall))
+        _must_be_on_one_side(case, particles.position)
+    return particles
 
 
 @contextmanager
@@ -134,16 +134,16 @@ def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) ->
     raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
 
 
-def _must_be_apart(made: Particles, walls: Sequence[Wall], of_column: int) -> None:
+def _must_be_apart(particles: Particles, walls: Sequence[Wall], of_column: int) -> None:
     """Refuse particles that overlap walls.
 
     of_column  number of walls of the column, which come first
     """
     arrays = wall_arrays(walls)
-    movable = make_bodies(made.position, made.radius, made.density)  # the fixed ones as well
+    movable = make_bodies(particles.position, particles.radius, particles.density)  # the fixed ones as well
     rows, pieces = near_walls(movable, arrays, -LARGEST_OVERLAP, 0.0)
     if len(rows):
-        place = ", ".join(f"{each:.4g}" for each in made.position[rows[0]])
+        place = ", ".join(f"{coordinate:.4g}" for coordinate in particles.position[rows[0]])
         number = int(arrays.wall[pieces[0]]) - of_column
         name = f"wall.{number}" if number >= 0 else "a wall of the column"
         raise InputError(
@@ -155,8 +155,8 @@ def _must_be_apart(made: Particles, walls: Sequence[Wall], of_column: int) -> No
 def _must_be_on_one_side(case: Case, position: Array) -> None:
     """Refuse particles on the wrong side of a closed surface."""
     for number in range(len(case.wall)):
-        if (found := on_the_wrong_side(case, number, position)) is not None:
-            row, why, remedy = found
+        if (misplaced := on_the_wrong_side(case, number, position)) is not None:
+            row, why, remedy = misplaced
             limit = f"on the other side of the closed surface of wall.{number}.file"
             raise InputError(f"position of particle {row}", None, limit, f"{why}; {remedy}")
 

@@ -23,23 +23,25 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
     base    conditions without patches
     errors  InputError for a patch that covers no opening
     """
-    found = patch_faces(case, side)
-    if not found.patches:
+    of_side = patch_faces(case, side)
+    if not of_side.patches:
         return base
     listed = base if isinstance(base, list) else [base]
-    if any(each.shape == "whole" and not each.brings for each in found.patches.values()):
+    if any(patch.shape == "whole" and not patch.brings for patch in of_side.patches.values()):
         listed = [NoSlip()]  # nothing of the side itself is left
-    made, inlets = [*listed], found.inlets
-    for name, each in found.patches.items():
-        if not each.brings:
-            where = _at(case, side, found.whole(name))
-            made.append(NoSlip(where=where) if each.kind == "wall" else Outlet(each.pressure or 0.0, where=where))
+    conditions, inlets = [*listed], of_side.inlets
+    for name, patch in of_side.patches.items():
+        if not patch.brings:
+            where = _at(case, side, of_side.whole(name))
+            conditions.append(
+                NoSlip(where=where) if patch.kind == "wall" else Outlet(patch.pressure or 0.0, where=where)
+            )
         elif name == inlets[-1]:  # all inlets at once: two may share a face
-            speeds = [(found.patches[one].speed, found.shares[one]) for one in inlets]
+            speeds = [(of_side.patches[one].speed, of_side.shares[one]) for one in inlets]
             entering = np.sum([share for _, share in speeds], axis=0) > 0.0
-            velocity = _velocity(case, side, speeds, _before(listed[0]), found.rest)
-            made.append(Inlet(velocity, where=_at(case, side, entering)))
-    return made
+            velocity = _velocity(case, side, speeds, _before(listed[0]), of_side.rest)
+            conditions.append(Inlet(velocity, where=_at(case, side, entering)))
+    return conditions
 
 
 def _before(condition: Condition) -> Callable[[float], float]:

@@ -128,8 +128,8 @@ def _logged(path: Path | None) -> Iterator[None]:
     terminal = logging.StreamHandler()
     terminal.setLevel(logging.WARNING)
     terminal.setFormatter(logging.Formatter("cfddem: warning: %(message)s"))
-    for each in (handler, terminal):
-        package.addHandler(each)
+    for target in (handler, terminal):
+        package.addHandler(target)
     package.setLevel(logging.INFO)
     try:
         yield
@@ -138,8 +138,8 @@ def _logged(path: Path | None) -> Iterator[None]:
         raise
     finally:
         package.setLevel(before)
-        for each in (handler, terminal):
-            package.removeHandler(each)
+        for target in (handler, terminal):
+            package.removeHandler(target)
         handler.close()
 
 

@@ -70,7 +70,7 @@ def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float
     for key, name in case.laws.missing.items():
         if name in REGISTRY.get(key, {}):
             return Case.from_toml(path, overrides)  # it says why the law cannot be used
-        lost = [f"; the package {each} could not be loaded: {why}" for each, why in load_package_laws().items()]
+        lost = [f"; the package {package} could not be loaded: {why}" for package, why in load_package_laws().items()]
         remedy = (
             f"resume it with the file that declares the law: cfddem resume {folder} --laws FILE.py; or install its "
             f"package; or import it in Python and call cfddem.Run.resume{''.join(lost)}"
@@ -80,14 +80,14 @@ def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float
 
 
 def restored(
-    case: Case, state: Mapping[str, Any], folder: Path, communicator: Communicator, **given: Any
+    case: Case, state: Mapping[str, Any], folder: Path, communicator: Communicator, **arguments: Any
 ) -> Simulation:
     """The simulation of a checkpoint; InputError if the checkpoint does not fit.
 
     given  fields, callbacks and features of the simulation
     """
     try:
-        simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **given)
+        simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **arguments)
     except (KeyError, IndexError, TypeError) as failure:
         remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
         raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
@@ -135,12 +135,12 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
     before = case_to_continue(origin, None, None)
     for key in changed([before, case]):
         if key not in NAMED and not _CHANGEABLE.fullmatch(key):
-            others = ", ".join(each for each in CHANGEABLE if each.startswith(f"{key.split('.')[0]}."))
+            others = ", ".join(table for table in CHANGEABLE if table.startswith(f"{key.split('.')[0]}."))
             remedy = f"of this table, {others} can change" if others else "run the changed case from its beginning"
             raise InputError(key, None, f"left as it is in {origin}, whose state depends on it", remedy)
     for key in NAMED:
-        chosen = [getattr(each, key.removeprefix("laws.")) for each in (before, case)]
-        was, now = (each if isinstance(each, str) else each.name for each in chosen)
+        chosen = [getattr(which, key.removeprefix("laws.")) for which in (before, case)]
+        was, now = (law if isinstance(law, str) else law.name for law in chosen)
         if was != now:
             raise InputError(key, now, f"{was!r}, as in {origin}", f"name it where it is auto: --set {key}={was}")
     try:
@@ -191,12 +191,12 @@ def record_of(case: Case) -> dict[str, Any]:
 
     returns  empty if all laws are built in
     """
-    found = {kind: _described(law.name, law.function) for kind, law in case.laws.own_laws.items()}
+    laws = {kind: _described(law.name, law.function) for kind, law in case.laws.own_laws.items()}
     contact = case.laws.contact_law
     if not contact.force.__module__.startswith(("cfddem.", "closures.")):
-        functions = tuple(each for each in vars(contact).values() if callable(each))
-        found["contact"] = {**_described(contact.name, contact.force), "fingerprint": fingerprint(functions)}
-    return {RECORD: found} if found else {}
+        functions = tuple(part for part in vars(contact).values() if callable(part))
+        laws["contact"] = {**_described(contact.name, contact.force), "fingerprint": fingerprint(functions)}
+    return {RECORD: laws} if laws else {}
 
 
 def warn_of_changes(folder: RunFolder, case: Case) -> None:

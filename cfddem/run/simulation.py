@@ -92,9 +92,9 @@ class Simulation:
         if coupling is not None and any(particle_solver.gravity):
             remedy = "a coupled particle has the force Weight(density of the fluid, gravity)"
             raise InputError("gravity", tuple(particle_solver.gravity), "0 in a particle solver with a fluid", remedy)
-        made = cls.__new__(cls)
-        made._begin(None, Parts(particle_solver, coupling), steps, fields, callbacks, features, state)
-        return made
+        simulation = cls.__new__(cls)
+        simulation._begin(None, Parts(particle_solver, coupling), steps, fields, callbacks, features, state)
+        return simulation
 
     def _begin(
         self,
@@ -111,9 +111,9 @@ class Simulation:
         self._around = self._coupling or Uncoupled(self.particle_solver)
         self._fluid, self.forces, self.gravity = self._around.fluid, self._around.forces, self._around.gravity
         self.communicator, self.timers = self.particle_solver.communicator, self.particle_solver.timers
-        kinds = [] if case is None else [each for each in FEATURES if each.is_in(case)]
+        kinds = [] if case is None else [feature for feature in FEATURES if feature.is_in(case)]
         if case is not None:
-            fields = [*fields, *(field for each in kinds for field in each.fields_of(case))]
+            fields = [*fields, *(field for kind in kinds for field in kind.fields_of(case))]
         self.callbacks, fields = list(callbacks), list(fields)
         self.terms: ForceTerms | None = None  # of the last step between fluid and particles
         self.features: list[Equipment] = []
@@ -163,18 +163,20 @@ class Simulation:
     @property
     def _taken(self) -> set[str]:
         """Names that equipment cannot have: those of the features of the case, which may come later, and of others."""
-        of_case = (each.name for each in FEATURES if self._case is not None and each.is_in(self._case))
-        return {"", *of_case, *(each.name for each in self.features)}
+        of_case = (kind.name for kind in FEATURES if self._case is not None and kind.is_in(self._case))
+        return {"", *of_case, *(feature.name for feature in self.features)}
 
     def feature(self, kind: type[Kind]) -> Kind:
         """The feature of a kind that the simulation has.
 
         errors  InputError if it has none
         """
-        for each in self.features:
-            if isinstance(each, kind):
-                return each
-        raise InputError("feature", kind.__name__, "one of " + ", ".join(type(each).__name__ for each in self.features))
+        for feature in self.features:
+            if isinstance(feature, kind):
+                return feature
+        raise InputError(
+            "feature", kind.__name__, "one of " + ", ".join(type(feature).__name__ for feature in self.features)
+        )
 
     @property
     def particles(self) -> Particles:
@@ -293,7 +295,7 @@ class Simulation:
         parts |= self._around.state()
         if forces := self.forces.checkpoint(self.communicator):
             parts |= {"forces": forces}
-        if kept := {each.name: state for each in self.features if (state := each.checkpoint())}:
+        if kept := {feature.name: state for feature in self.features if (state := feature.checkpoint())}:
             parts |= {"features": kept}
         return parts
 
@@ -324,14 +326,14 @@ class Simulation:
 
     def _restore_features(self, kept: dict[str, Any]) -> None:
         """Take over what a checkpoint keeps of the features."""
-        require_features(kept, [each.name for each in self.features])
+        require_features(kept, [feature.name for feature in self.features])
         for feature in self.features:
             if feature.name in kept:
                 feature.restore(kept[feature.name])
 
     def _step_limits(self) -> dict[str, float]:
         """Longest fluid step that the features allow, by criterion [s]."""
-        return {name: longest for each in self.features for name, longest in each.step_limits.items()}
+        return {name: longest for feature in self.features for name, longest in feature.step_limits.items()}
 
     def is_acted_on(self) -> bool:
         """Whether a user's function may put energy in."""

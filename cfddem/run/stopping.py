@@ -38,14 +38,14 @@ class StopRequest:
 
     def agreed(self, communicator: Communicator) -> bool:
         """Whether a rank has received a signal; then all ranks take it for theirs."""
-        found = communicator.largest([self.signal])
-        if found:  # a signal that came during the call is found by the next one
-            self.signal = found
-        return bool(found)
+        number = communicator.largest([self.signal])
+        if number:  # a signal that came during the call is found by the next one
+            self.signal = number
+        return bool(number)
 
     def __enter__(self) -> StopRequest:
         if threading.current_thread() is threading.main_thread():
-            self._before = {each: signal.signal(each, self._receive) for each in (signal.SIGINT, signal.SIGTERM)}
+            self._before = {number: signal.signal(number, self._receive) for number in (signal.SIGINT, signal.SIGTERM)}
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
@@ -66,10 +66,10 @@ FEWEST_INDEPENDENT = 16.0
 
 def require_measures_of(case: Case) -> None:
     """Refuse names in `run.until_error` that are no measures of the case."""
-    known = sorted(name for name, each in all_columns(case).items() if each.group == "measure")
+    measures = sorted(name for name, quantity in all_columns(case).items() if quantity.group == "measure")
     for name in case.run.until_error:
-        if name not in known:
-            raise InputError("run.until_error", name, nearest(name, known))
+        if name not in measures:
+            raise InputError("run.until_error", name, nearest(name, measures))
 
 
 def averages_from(history: Mapping[str, np.ndarray], limits: Mapping[str, float], earliest: float = 0.0) -> float:
@@ -86,12 +86,12 @@ def averages_from(history: Mapping[str, np.ndarray], limits: Mapping[str, float]
     Start-up and stationarity are those of :func:`cfddem.analysis.series.stationarity`, errors those of
     :func:`cfddem.analysis.series.block_average`.
     """
-    found = [stationarity(history[name]) for name in limits]
-    if not found or not all(each.stationary for each in found):
+    series = [stationarity(history[name]) for name in limits]
+    if not series or not all(one.stationary for one in series):
         return float("nan")
-    start = max(int(np.searchsorted(history["time"], earliest)), *(each.start for each in found))
-    known = all(_is_known(history[name][start:], limit) for name, limit in limits.items())
-    return float(history["time"][start]) if known else float("nan")
+    start = max(int(np.searchsorted(history["time"], earliest)), *(one.start for one in series))
+    all_known = all(_is_known(history[name][start:], limit) for name, limit in limits.items())
+    return float(history["time"][start]) if all_known else float("nan")
 
 
 def _is_known(values: np.ndarray, limit: float) -> bool:

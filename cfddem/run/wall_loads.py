@@ -64,53 +64,53 @@ def loaded_walls(case: Case) -> Iterator[Loaded]:
         of_fluid = SIDES.get(name, name) if case.has_fluid and wall is None else ""
         if name == "side":
             of_fluid = SMOOTH if case.has_smooth_walls else ""
-        made = Loaded(
+        loaded = Loaded(
             number, f"wall_{name}" if wall else name, f"wall {name}" if wall else f"the wall {name}", wall,
             wall.spin if wall else spin, of_fluid,
         )  # fmt: skip
-        if made.moves or case.run.wall_forces:
-            yield made
+        if loaded.moves or case.run.wall_forces:
+            yield loaded
 
 
 def wall_load_columns(case: Case) -> dict[str, Quantity]:
     """Columns of the history, for every wall whose loads are recorded."""
-    found: dict[str, Quantity] = {}
-    for each in loaded_walls(case):
-        sources = [("", "particles")] + [("fluid_", "fluid, its hydrostatic pressure left out,")] * bool(each.of_fluid)
-        about = "its spin axis" if any(each.spin) else "the upright axis of the column"
+    columns: dict[str, Quantity] = {}
+    for wall in loaded_walls(case):
+        sources = [("", "particles")] + [("fluid_", "fluid, its hydrostatic pressure left out,")] * bool(wall.of_fluid)
+        about = "its spin axis" if any(wall.spin) else "the upright axis of the column"
         for of, source in sources:
-            name, words = f"{each.name}_{of}", f"of the {source} on {each.words}"
-            found |= {f"{name}force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES}
-            if any(each.spin) or case.run.wall_forces:
-                found[f"{name}torque"] = Quantity("N m", f"torque {words} about {about}", "measure")
-        if each.moves:
-            meaning = f"power that the motion of {each.words} gives to the particles"
-            found[f"{each.name}_power"] = Quantity("W", meaning, "measure")
-    return found
+            name, words = f"{wall.name}_{of}", f"of the {source} on {wall.words}"
+            columns |= {f"{name}force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES}
+            if any(wall.spin) or case.run.wall_forces:
+                columns[f"{name}torque"] = Quantity("N m", f"torque {words} about {about}", "measure")
+        if wall.moves:
+            meaning = f"power that the motion of {wall.words} gives to the particles"
+            columns[f"{wall.name}_power"] = Quantity("W", meaning, "measure")
+    return columns
 
 
 def wall_loads(simulation: Simulation) -> dict[str, float]:
     """Values of the columns, from contacts, films and bridges; a film or bridge has its last impulse over the step."""
-    case, walls, found = simulation.case, simulation.particle_solver.walls, dict[str, float]()
+    case, walls, loads_of_walls = simulation.case, simulation.particle_solver.walls, dict[str, float]()
     force, torque = loads_of_particles(simulation.particle_solver)
     axis = np.array((0.5 * case.column.size[0], 0.5 * case.column.size[1], 0.0))
     recorded = list(loaded_walls(case))
-    of_fluid = loads_on_walls(simulation.fluid, axis) if any(each.of_fluid for each in recorded) else {}
-    for each in recorded:
-        m = each.number
+    of_fluid = loads_on_walls(simulation.fluid, axis) if any(wall.of_fluid for wall in recorded) else {}
+    for wall in recorded:
+        m = wall.number
         pushed, turned, about = force[m], torque[m], (0.0, 0.0, 1.0)
-        if any(each.spin):
-            about = each.spin
+        if any(wall.spin):
+            about = wall.spin
         else:  # about the axis of the column
             turned = turned + np.cross((walls.centre + walls.shift)[m] - axis, pushed)
-        loads = {"": (pushed, turned)} | ({"fluid_": of_fluid[each.of_fluid]} if each.of_fluid else {})
+        loads = {"": (pushed, turned)} | ({"fluid_": of_fluid[wall.of_fluid]} if wall.of_fluid else {})
         for of, (push, turn) in loads.items():
-            found |= {f"{each.name}_{of}force_{x}": float(value) for x, value in zip(AXES, push)}
-            if any(each.spin) or case.run.wall_forces:
-                found[f"{each.name}_{of}torque"] = float(turn @ np.array(about)) / math.hypot(*about)
-        if each.moves:
-            found[f"{each.name}_power"] = -float(pushed @ walls.velocity[m] + torque[m] @ walls.spin[m])
-    return found
+            loads_of_walls |= {f"{wall.name}_{of}force_{x}": float(value) for x, value in zip(AXES, push)}
+            if any(wall.spin) or case.run.wall_forces:
+                loads_of_walls[f"{wall.name}_{of}torque"] = float(turn @ np.array(about)) / math.hypot(*about)
+        if wall.moves:
+            loads_of_walls[f"{wall.name}_power"] = -float(pushed @ walls.velocity[m] + torque[m] @ walls.spin[m])
+    return loads_of_walls
 
 
 def loads_of_particles(solver: ParticleSolver) -> tuple[Array, Array]:
