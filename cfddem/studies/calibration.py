@@ -62,12 +62,12 @@ class Calibration:
     @property
     def finished(self) -> list[Trial]:
         """Trials with a value."""
-        return [each for each in self.trials if each.computed]
+        return [trial for trial in self.trials if trial.computed]
 
     @property
     def best(self) -> Trial | None:
         """The trial that differs least from the data."""
-        return min(self.finished, key=lambda each: each.chi2, default=None)
+        return min(self.finished, key=lambda trial: trial.chi2, default=None)
 
     @property
     def verdict(self) -> str:
@@ -84,7 +84,8 @@ class Calibration:
 
     def _agrees(self) -> tuple[bool, float, float]:
         """Whether the best values agree with the data, their reduced chi-squared, and the largest one by chance."""
-        points, chi2 = sum(len(each.value) for each in self.data), min(each.chi2 for each in self.finished)
+        points = sum(len(measured.value) for measured in self.data)
+        chi2 = min(trial.chi2 for trial in self.finished)
         most = largest_chi2(points)
         if chi2 > most and self.response is not None:
             chi2, most = self.response.chi2, largest_chi2(max(points - len(self.variables), 1))
@@ -92,20 +93,20 @@ class Calibration:
 
     def estimates(self) -> list[dict[str, Any]]:
         """Best value, standard error and verdict of each key, as plain values."""
-        if (found := self.response) is None:
+        if (response := self.response) is None:
             return []
         rows, agrees = [], self._agrees()[0]
-        for place, each in enumerate(self.variables):
-            share, error = float(found.best[place]), float(found.error[place])
-            low, high = (each.value(min(max(end, 0.0), 1.0)) for end in (share - error, share + error))
+        for place, variable in enumerate(self.variables):
+            share, error = float(response.best[place]), float(response.error[place])
+            low, high = (variable.value(min(max(end, 0.0), 1.0)) for end in (share - error, share + error))
             tied = [
                 f"{self.variables[b if a == place else a].key} ({r:+.2f})"
-                for a, b, r in found.tied() if place in (a, b)
+                for a, b, r in response.tied() if place in (a, b)
             ]  # fmt: skip
-            identified = bool(found.identified[place])
+            identified = bool(response.identified[place])
             rows.append({
-                "key": each.key, "value": each.value(share), "error": 0.5 * (high - low) if each.logarithmic
-                else error * (each.high - each.low), "low": each.low, "high": each.high,
+                "key": variable.key, "value": variable.value(share), "error": 0.5 * (high - low) if variable.logarithmic
+                else error * (variable.high - variable.low), "low": variable.low, "high": variable.high,
                 "identified": identified, "tied": tied, "at_limit": min(share, 1.0 - share) < 0.01,
                 "verdict": _verdict(identified, tied, min(share, 1.0 - share) < 0.01, agrees),
             })  # fmt: skip
@@ -121,7 +122,9 @@ class Calibration:
             "best": None if best is None else {"trial": best.number, "values": best.values, "chi2": best.chi2},
             "trials": len(self.trials),
             "failed": len(self.trials) - len(self.finished),
-            "data": [{"name": each.name, "quantity": each.quantity, "points": len(each.value)} for each in self.data],
+            "data": [
+                {"name": points.name, "quantity": points.quantity, "points": len(points.value)} for points in self.data
+            ],
         }
 
 
@@ -154,10 +157,10 @@ def calibrate(
     data = _data(case)
     require_measured_units(case.compare, history.units_of(case))
     for low_or_high in (0.0, 1.0):  # both ends of all ranges are valid values
-        case.with_(**{each.key: each.value(low_or_high) for each in varied})
+        case.with_(**{variable.key: variable.value(low_or_high) for variable in varied})
     sweep.make_output(output)
     study = _study(output, _fingerprint(case, varied, data))
-    done = [_trial(each) for each in study.get_trials(deepcopy=False) if "status" in each.user_attrs]
+    done = [_trial(trial) for trial in study.get_trials(deepcopy=False) if "status" in trial.user_attrs]
     search = _Search(study, varied, data, done)
     while len(search.done) < trials:
         asked = search.ask(min(jobs, trials - len(search.done)))
@@ -173,31 +176,31 @@ def calibrate(
             if outcome.status == "stopped":
                 raise RunStopped("calibration stopped; the same command continues it", signal.SIGINT)
             progress(search.tell(number, outcome, _computed(outcome, case, data)))
-    found = Calibration(tuple(varied), tuple(data), tuple(search.done), response_of(varied, data, search.done))
-    write_results(found, output)
-    return found
+    calibration = Calibration(tuple(varied), tuple(data), tuple(search.done), response_of(varied, data, search.done))
+    write_results(calibration, output)
+    return calibration
 
 
 def _data(case: Case) -> list[Points]:
-    data = [points_of(name, each) for name, each in case.compare.items()]
+    data = [points_of(name, compared) for name, compared in case.compare.items()]
     if not data:
         raise InputError("--match", None, "given, or [compare] in the case", "there is nothing to calibrate against")
-    for each in data:
-        if not np.isfinite(each.error).all():  # local: of measured points
+    for points in data:
+        if not np.isfinite(points.error).all():  # local: of measured points
             remedy = "add a column error, or relative_error in [compare] of the case"
-            raise InputError(f"data {each.name}", None, "given with standard errors", remedy)
-        if each.against != "inlet_velocity":
+            raise InputError(f"data {points.name}", None, "given with standard errors", remedy)
+        if points.against != "inlet_velocity":
             continue
-        in_run = held(case.bed.inlet_velocity, case.run.until, each.place)
+        in_run = held(case.bed.inlet_velocity, case.run.until, points.place)
         if not in_run.all():  # local: measured points
-            missing = float(each.place[~in_run][0])
-            remedy = f"for all points: {steps_of(each.place, case.run.until)}"
-            raise InputError(f"data {each.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
+            missing = float(points.place[~in_run][0])
+            remedy = f"for all points: {steps_of(points.place, case.run.until)}"
+            raise InputError(f"data {points.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
     return data
 
 
 def _seed(case: Case, varied: Sequence[Variable], number: int) -> dict[str, int]:
-    return {} if SEED in [each.key for each in varied] else {SEED: case.bed.seed + number}
+    return {} if SEED in [variable.key for variable in varied] else {SEED: case.bed.seed + number}
 
 
 # ---------------------------------------------------------------- the search
@@ -216,8 +219,8 @@ class _Search:
         import optuna
 
         ranges = {
-            each.key: optuna.distributions.FloatDistribution(each.low, each.high, log=each.logarithmic)
-            for each in self.varied
+            variable.key: optuna.distributions.FloatDistribution(variable.low, variable.high, log=variable.logarithmic)
+            for variable in self.varied
         }
         for place in range(count):
             self._enqueue(len(self.done) + place)
@@ -237,20 +240,20 @@ class _Search:
             self.study.tell(trial, chi2_of(computed, self.data))
         else:
             self.study.tell(trial, state=optuna.trial.TrialState.FAIL)
-        made = Trial(number, dict(trial.params), status, computed, chi2_of(computed, self.data))
-        self.done.append(made)
-        return made
+        record = Trial(number, dict(trial.params), status, computed, chi2_of(computed, self.data))
+        self.done.append(record)
+        return record
 
     def _enqueue(self, place: int) -> None:
         """Fix the values of the trial at a place: a sample first, then each second one at the best of the fit."""
         if place < len(self.first):
             shares = self.first[place]
-        elif place % 2 and (found := response_of(self.varied, self.data, self.done)) is not None:
-            spread = np.random.default_rng(place).normal(size=len(found.best))
-            shares = (found.best + 0.5 * found.error * spread).clip(0.0, 1.0)
+        elif place % 2 and (response := response_of(self.varied, self.data, self.done)) is not None:
+            spread = np.random.default_rng(place).normal(size=len(response.best))
+            shares = (response.best + 0.5 * response.error * spread).clip(0.0, 1.0)
         else:
             return
-        self.study.enqueue_trial({each.key: each.value(share) for each, share in zip(self.varied, shares)})
+        self.study.enqueue_trial({variable.key: variable.value(share) for variable, share in zip(self.varied, shares)})
 
 
 def _study(output: Path, fingerprint: str) -> Any:
@@ -267,14 +270,14 @@ def _study(output: Path, fingerprint: str) -> Any:
     warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
     sampler = optuna.samplers.TPESampler(seed=1, n_startup_trials=1, multivariate=True)
     study = optuna.create_study(storage=storage, study_name=STUDY, load_if_exists=True, sampler=sampler)
-    known = study.user_attrs.get("fingerprint")
-    if known not in (None, fingerprint):
+    earlier = study.user_attrs.get("fingerprint")
+    if earlier not in (None, fingerprint):
         limit = "a folder of the same case, data and ranges"
         raise InputError("output", str(output), limit, "choose another folder with -o")
     study.set_user_attr("fingerprint", fingerprint)
-    for each in study.get_trials(deepcopy=False):
-        if each.state == optuna.trial.TrialState.RUNNING:  # of a process that was killed; it does not count
-            study.tell(each.number, state=optuna.trial.TrialState.FAIL)
+    for trial in study.get_trials(deepcopy=False):
+        if trial.state == optuna.trial.TrialState.RUNNING:  # of a process that was killed; it does not count
+            study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
     sampler.reseed_rng()
     return study
 
@@ -291,11 +294,11 @@ def _fingerprint(case: Case, varied: Sequence[Variable], data: Sequence[Points])
     """A number that changes with case, ranges or data."""
     plain = case.model_copy(update={"compare": {}})
     points = [
-        [each.name, each.quantity, each.against, each.weight]
-        + [column.tolist() for column in (each.place, each.value, each.error)]
-        for each in data
+        [points.name, points.quantity, points.against, points.weight]
+        + [column.tolist() for column in (points.place, points.value, points.error)]
+        for points in data
     ]
-    text = json.dumps([plain.to_toml(), [list(each) for each in varied], points])
+    text = json.dumps([plain.to_toml(), [list(variable) for variable in varied], points])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -306,7 +309,7 @@ def _computed(outcome: sweep.Outcome, case: Case, data: Sequence[Points]) -> tup
     run = open_run(outcome.folder)
     begin, _ = window_of(run, case)
     try:
-        values = np.concatenate([compared_at(run, case, each, begin).computed for each in data])
+        values = np.concatenate([compared_at(run, case, points, begin).computed for points in data])
     except CfddemError:
         return ()
     return tuple(values.tolist()) if np.isfinite(values).all() else ()  # local: of measured points
@@ -323,18 +326,18 @@ def chi2_of(computed: Sequence[float], data: Sequence[Points]) -> float:
 
 def _joined(data: Sequence[Points]) -> tuple[Array, Array, Array]:
     """Value, error and weight of all points."""
-    weights = [np.full(len(each.value), each.weight) for each in data]
+    weights = [np.full(len(points.value), points.weight) for points in data]
     return (
-        np.concatenate([each.value for each in data]), np.concatenate([each.error for each in data]),
+        np.concatenate([points.value for points in data]), np.concatenate([points.error for points in data]),
         np.concatenate(weights),
     )  # fmt: skip
 
 
 def response_of(varied: Sequence[Variable], data: Sequence[Points], done: Sequence[Trial]) -> Response | None:
     """The response of a model to its keys, by the trials with a value; None with too few of them."""
-    if not (good := [each for each in done if each.computed]):
+    if not (good := [trial for trial in done if trial.computed]):
         return None
-    shares = np.array([[each.share(trial.values[each.key]) for each in varied] for trial in good])
+    shares = np.array([[variable.share(trial.values[variable.key]) for variable in varied] for trial in good])
     return response(shares, np.array([trial.computed for trial in good]), *_joined(data))
 
 
@@ -351,15 +354,15 @@ def _verdict(identified: bool, tied: Sequence[str], at_limit: bool, agrees: bool
 # ---------------------------------------------------------------- results
 
 
-def write_results(found: Calibration, output: Path) -> None:
+def write_results(calibration: Calibration, output: Path) -> None:
     """Write `calibration.json`, `trials.csv` and `calibration.png`."""
     from cfddem.plotting.study_figures import calibration_figure
 
-    write_whole(output / "calibration.json", as_json(found.summary()).encode())
-    lines = [",".join(["trial", *(each.key for each in found.variables), "chi2", "status"])]
-    for each in found.trials:
-        words = each.status.replace('"', "'")
-        lines.append(",".join([str(each.number), *map(str, each.values.values()), f"{each.chi2:.6g}", f'"{words}"']))
+    write_whole(output / "calibration.json", as_json(calibration.summary()).encode())
+    lines = [",".join(["trial", *(variable.key for variable in calibration.variables), "chi2", "status"])]
+    for trial in calibration.trials:
+        words = trial.status.replace('"', "'")
+        lines.append(",".join([str(trial.number), *map(str, trial.values.values()), f"{trial.chi2:.6g}", f'"{words}"']))
     write_whole(output / "trials.csv", ("\n".join(lines) + "\n").encode())
-    if found.finished:
-        calibration_figure(found, output / "calibration.png")
+    if calibration.finished:
+        calibration_figure(calibration, output / "calibration.png")

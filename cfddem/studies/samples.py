@@ -40,10 +40,10 @@ class Variable(NamedTuple):
         (2.0, 10.0)
         """
         if self.logarithmic:
-            found = math.exp((1.0 - share) * math.log(self.low) + share * math.log(self.high))
+            number = math.exp((1.0 - share) * math.log(self.low) + share * math.log(self.high))
         else:
-            found = (1.0 - share) * self.low + share * self.high
-        return min(max(float(f"{found:.{DIGITS}g}"), self.low), self.high)
+            number = (1.0 - share) * self.low + share * self.high
+        return min(max(float(f"{number:.{DIGITS}g}"), self.low), self.high)
 
     def share(self, value: float) -> float:
         """The share of the range at a value."""
@@ -52,7 +52,7 @@ class Variable(NamedTuple):
         return (value - self.low) / (self.high - self.low)
 
 
-def variables(given: Sequence[str], key_of: Callable[[str], str] = full_key) -> list[Variable]:
+def variables(texts: Sequence[str], key_of: Callable[[str], str] = full_key) -> list[Variable]:
     """Keys and ranges from texts such as `friction=0.1..0.5` and `viscosity=1e-4..1e-2 log`.
 
     key_of  gives the whole name of a key
@@ -61,25 +61,27 @@ def variables(given: Sequence[str], key_of: Callable[[str], str] = full_key) -> 
     >>> variables(["inlet_velocity=0.02..0.05", "fluid.viscosity=1e-4..1e-2 log"])[1]
     Variable(key='fluid.viscosity', low=0.0001, high=0.01, logarithmic=True)
     """
-    found: list[Variable] = []
-    for each in given:
-        key, _, text = each.partition("=")
+    varied: list[Variable] = []
+    for text_of_key in texts:
+        key, _, text = text_of_key.partition("=")
         span = re.fullmatch(r"\s*([-+.\deE]{1,30}?)\s*\.\.\s*([-+.\deE]{1,30})(\s+log)?\s*", text)
         try:
             low, high = (float(span[1]), float(span[2])) if span else (math.nan, math.nan)
         except ValueError:
             low = high = math.nan
         if not low < high < math.inf:
-            raise InputError("--vary", each, "key=low..high, such as friction=0.1..0.5; for a log scale, add ' log'")
+            raise InputError(
+                "--vary", text_of_key, "key=low..high, such as friction=0.1..0.5; for a log scale, add ' log'"
+            )
         name, logarithmic = key_of(key.strip()), bool(span and span[3])
         if logarithmic and low <= 0.0:
-            raise InputError("--vary", each, "a range above 0 for a log scale")
-        if name in [known.key for known in found]:
+            raise InputError("--vary", text_of_key, "a range above 0 for a log scale")
+        if name in [variable.key for variable in varied]:
             raise InputError("--vary", name, "given once")
-        found.append(Variable(name, low, high, logarithmic))
-    if not 1 <= len(found) <= MOST_VARIABLES:
-        raise InputError("--vary", len(found), f"given 1 to {MOST_VARIABLES} times")
-    return found
+        varied.append(Variable(name, low, high, logarithmic))
+    if not 1 <= len(varied) <= MOST_VARIABLES:
+        raise InputError("--vary", len(varied), f"given 1 to {MOST_VARIABLES} times")
+    return varied
 
 
 def chosen_values(over: Sequence[str], vary: Sequence[str], kind: str, count: int) -> Over:
@@ -101,7 +103,7 @@ def samples(varied: Sequence[Variable], count: int, kind: str, seed: int = 1) ->
     """
     if not 1 <= count <= MOST_SAMPLES:
         raise InputError("--runs", count, f"1 to {MOST_SAMPLES}")
-    return [{each.key: each.value(share) for each, share in zip(varied, row)} for row in unit_samples(
+    return [{variable.key: variable.value(share) for variable, share in zip(varied, row)} for row in unit_samples(
         len(varied), count, kind, seed)]  # fmt: skip
 
 

@@ -66,7 +66,7 @@ class Choice(NamedTuple):
         return self.values[min(int(share * len(self.values) * (1.0 + 1e-12)), len(self.values) - 1)]
 
 
-def factors(given: Sequence[str]) -> list[Variable | Choice]:
+def factors(texts: Sequence[str]) -> list[Variable | Choice]:
     """Keys with ranges or listed values from texts such as `friction=0.1..0.5` and `laws.drag=wen_yu,ergun`.
 
     errors  InputError
@@ -74,22 +74,22 @@ def factors(given: Sequence[str]) -> list[Variable | Choice]:
     >>> [each.key for each in factors(["bed.diameter=1e-3..2e-3", "laws.drag=wen_yu,ergun"])]
     ['bed.diameter', 'laws.drag']
     """
-    found: list[Variable | Choice] = []
-    for each in given:
-        if ".." in each.partition("=")[2]:
-            found += variables([each])
+    varied: list[Variable | Choice] = []
+    for text in texts:
+        if ".." in text.partition("=")[2]:
+            varied += variables([text])
         else:
-            ((key, values),) = ranges([each]).items()
-            found.append(Choice(key, tuple(values)))
+            ((key, values),) = ranges([text]).items()
+            varied.append(Choice(key, tuple(values)))
             if len(values) < 2:
-                raise InputError("--vary", each, "key=low..high, or key=value,value,...")
-    keys = [each.key for each in found]
+                raise InputError("--vary", text, "key=low..high, or key=value,value,...")
+    keys = [factor.key for factor in varied]
     for key in keys:
         if keys.count(key) > 1:
             raise InputError("--vary", key, "given once")
-    if not 1 <= len(found) <= MOST_VARIABLES:
-        raise InputError("--vary", len(found), f"given 1 to {MOST_VARIABLES} times")
-    return found
+    if not 1 <= len(varied) <= MOST_VARIABLES:
+        raise InputError("--vary", len(varied), f"given 1 to {MOST_VARIABLES} times")
+    return varied
 
 
 # ---------------------------------------------------------------- designs
@@ -149,14 +149,14 @@ def design(kind: str, count: int, keys: int, seed: int = 1) -> Design:
 def values_of(chosen: Design, varied: Sequence[Variable | Choice]) -> list[list[dict[str, Any]]]:
     """Values of all keys at every point of a design."""
     return [
-        [{each.key: each.value(float(share)) for each, share in zip(varied, point)} for point in rows]
+        [{variable.key: variable.value(float(share)) for variable, share in zip(varied, point)} for point in rows]
         for rows in chosen.points
     ]
 
 
 def runs_of(values: Sequence[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
     """The values of the points of a design, each once: points may coincide."""
-    return list({run_name(each): dict(each) for rows in values for each in rows}.values())
+    return list({run_name(row): dict(row) for rows in values for row in rows}.values())
 
 
 class Asked(NamedTuple):
@@ -203,12 +203,12 @@ def sobol_indices(values: Array, errors: Array | float = 0.0) -> tuple[Array, Ar
 
 def effects(values: Array, chosen: Design) -> Array:
     """Elementary effects (k, n) of values (k + 1, n) along the trajectories of a design."""
-    found = np.empty((chosen.order.shape[1], chosen.rows))
+    per_factor = np.empty((chosen.order.shape[1], chosen.rows))
     for step in range(chosen.order.shape[1]):
         rows, keys = np.arange(chosen.rows), chosen.order[:, step]
         way = chosen.points[step + 1, rows, keys] - chosen.points[step, rows, keys]
-        found[keys, rows] = (values[step + 1] - values[step]) / way
-    return found
+        per_factor[keys, rows] = (values[step + 1] - values[step]) / way
+    return per_factor
 
 
 def _sobol_rows(values: Array, errors: Array, chosen: Design) -> list[dict[str, float]]:
@@ -232,20 +232,20 @@ def _sobol_rows(values: Array, errors: Array, chosen: Design) -> list[dict[str, 
 
 def _morris_rows(values: Array, errors: Array, chosen: Design) -> list[dict[str, float]]:
     """Elementary effects and their errors by key; of a measure (k + 1, n)."""
-    found = effects(values, chosen)
+    elementary = effects(values, chosen)
     noise = np.hypot(errors[1:], errors[:-1]) / STEP  # of the step, not of the key
-    of_key = np.empty_like(found)
+    of_key = np.empty_like(elementary)
     for step in range(len(noise)):
         of_key[chosen.order[:, step], np.arange(chosen.rows)] = noise[step]
     count = math.sqrt(chosen.rows)
-    size = np.abs(found)
+    size = np.abs(elementary)
     return [
         {
             "effect": float(size[k].mean()), "effect_error": float(size[k].std(ddof=1)) / count,
-            "signed_effect": float(found[k].mean()), "spread": float(found[k].std(ddof=1)),
+            "signed_effect": float(elementary[k].mean()), "spread": float(elementary[k].std(ddof=1)),
             "effect_of_noise": float(math.sqrt(2.0 / math.pi) * of_key[k].mean()),
         }
-        for k in range(len(found))
+        for k in range(len(elementary))
     ]  # fmt: skip
 
 
@@ -282,7 +282,7 @@ class Sensitivity:
         out: list[str] = []
         for name in self.shown():
             unit, rows = self.measures[name]
-            listed = sorted(zip(self.keys, rows), key=lambda each: -each[1][_MAIN[self.kind]])
+            listed = sorted(zip(self.keys, rows), key=lambda key_and_row: -key_and_row[1][_MAIN[self.kind]])
             out += [
                 "",
                 f"{name.replace('_', ' ')} [{shown_unit(unit)}]" * (self.kind == "morris") or name.replace("_", " "),
@@ -326,37 +326,43 @@ def sensitivity(chosen: Design, varied: Sequence[Variable | Choice], outcomes: S
     outcomes  of the runs of `runs_of`, in any order
     errors    InputError where too few rows have finished
     """
-    known = {run_name(each.values): each for each in outcomes}
+    by_name = {run_name(outcome.values): outcome for outcome in outcomes}
     names = [[run_name(point) for point in rows] for rows in values_of(chosen, varied)]
-    finished = np.array([[bool(known[each].measures) if each in known else False for each in rows] for rows in names])
+    finished = np.array(
+        [[bool(by_name[name].measures) if name in by_name else False for name in rows] for rows in names]
+    )
     whole = np.all(finished, axis=0)
     if whole.sum() < FEWEST:
         limit = f"at least {FEWEST} rows of {chosen.rows} with all runs finished"
         raise InputError("--sensitivity", int(whole.sum()), limit, "more --runs, or narrower ranges")
     kept = Design(chosen.kind, chosen.points[:, whole], chosen.order[whole])
     places = np.flatnonzero(whole).tolist()
-    points = [[known[rows[place]] for place in places] for rows in names]
-    common = [name for name in points[0][0].measures if all(name in each.measures for rows in points for each in rows)]
+    points = [[by_name[rows[place]] for place in places] for rows in names]
+    common = [
+        name for name in points[0][0].measures if all(name in outcome.measures for rows in points for outcome in rows)
+    ]
     measures: dict[str, tuple[str, list[dict[str, float]]]] = {}
     for name in common:
-        found = np.array([[each.measures[name][:2] for each in rows] for rows in points], float)
-        values, errors = found[..., 0], np.nan_to_num(found[..., 1], nan=0.0)
+        means = np.array([[outcome.measures[name][:2] for outcome in rows] for rows in points], float)
+        values, errors = means[..., 0], np.nan_to_num(means[..., 1], nan=0.0)
         if not np.isfinite(values).all() or np.ptp(values) <= 1e-12 * np.abs(values).max():
             continue
         rows = (_sobol_rows if kept.kind == "sobol" else _morris_rows)(values, errors, kept)
         measures[name] = points[0][0].measures[name][2], rows
-    return Sensitivity(kept.kind, [each.key for each in varied], measures, (int(whole.sum()), chosen.rows), len(known))
+    return Sensitivity(
+        kept.kind, [factor.key for factor in varied], measures, (int(whole.sum()), chosen.rows), len(by_name)
+    )
 
 
-def write_results(found: Sensitivity, folder: Path) -> None:
+def write_results(sensitivity: Sensitivity, folder: Path) -> None:
     """Write `sensitivity.csv`, one row for each measure and key, and `sensitivity.png`."""
     from cfddem.plotting.study_figures import sensitivity_figure
 
     with (folder / "sensitivity.csv").open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file)
-        first = next(iter(found.measures.values()), ("", [{}]))[1][0]
+        first = next(iter(sensitivity.measures.values()), ("", [{}]))[1][0]
         out.writerow(["measure", "unit", "key", *first])
-        for name, (unit, rows) in found.measures.items():
-            for key, row in zip(found.keys, rows):
-                out.writerow([name, shown_unit(unit), key, *(f"{each:.6g}" for each in row.values())])
-    sensitivity_figure(found, folder / "sensitivity.png")
+        for name, (unit, rows) in sensitivity.measures.items():
+            for key, row in zip(sensitivity.keys, rows):
+                out.writerow([name, shown_unit(unit), key, *(f"{number:.6g}" for number in row.values())])
+    sensitivity_figure(sensitivity, folder / "sensitivity.png")

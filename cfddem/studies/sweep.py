@@ -67,11 +67,11 @@ class Outcome:
 
     def summary(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        measures = {name: dict(zip(("mean", "error", "unit"), each)) for name, each in self.measures.items()}
+        measures = {name: dict(zip(("mean", "error", "unit"), numbers)) for name, numbers in self.measures.items()}
         return asdict(self) | {"measures": measures}
 
 
-def ranges(given: Sequence[str]) -> dict[str, list[Any]]:
+def ranges(texts: Sequence[str]) -> dict[str, list[Any]]:
     """Keys and their values from texts such as `fluid.viscosity=1e-3,2e-3` and `seed=1..5`.
 
     errors  InputError for an unknown key, a key without values or too many runs
@@ -79,29 +79,29 @@ def ranges(given: Sequence[str]) -> dict[str, list[Any]]:
     >>> ranges(["viscosity=1e-3,2e-3", "seed=1..3", "laws.drag=wen_yu,di_felice"])
     {'fluid.viscosity': [0.001, 0.002], 'bed.seed': [1, 2, 3], 'laws.drag': ['wen_yu', 'di_felice']}
     """
-    found: dict[str, list[Any]] = {}
-    for each in given:
-        key, equals, text = each.partition("=")
+    by_key: dict[str, list[Any]] = {}
+    for entry in texts:
+        key, equals, text = entry.partition("=")
         if not equals or not text.strip():
-            raise InputError("--over", each, "key=value,value,... or key=first..last, such as seed=1..5")
+            raise InputError("--over", entry, "key=value,value,... or key=first..last, such as seed=1..5")
         key = full_key(key.strip())
-        if key in found:
+        if key in by_key:
             raise InputError("--over", key, "given once")
         span = re.fullmatch(r"\s*(-?\d{1,9})\.\.(-?\d{1,9})\s*", text)
         values = list(range(int(span[1]), int(span[2]) + 1)) if span else _values(text)
         if not values:
-            raise InputError("--over", each, "a range of at least one number, smaller first")
-        found[key] = values
-    count = math.prod(len(values) for values in found.values())
-    if not found or count > MOST:
-        raise InputError("--over", None, f"given, for at most {MOST} runs", f"here {count if found else 0}")
-    return found
+            raise InputError("--over", entry, "a range of at least one number, smaller first")
+        by_key[key] = values
+    count = math.prod(len(values) for values in by_key.values())
+    if not by_key or count > MOST:
+        raise InputError("--over", None, f"given, for at most {MOST} runs", f"here {count if by_key else 0}")
+    return by_key
 
 
 def _values(text: str) -> list[Any]:
     """Values separated by commas, which may be lists in brackets."""
     whole = read_value(f"[{text}]")
-    return whole if isinstance(whole, list) else [read_value(each.strip()) for each in text.split(",")]
+    return whole if isinstance(whole, list) else [read_value(part.strip()) for part in text.split(",")]
 
 
 def run_name(values: Mapping[str, Any]) -> str:
@@ -178,7 +178,7 @@ def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
     from joblib import Parallel, delayed
 
     with safe_workers():
-        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
+        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*job) for job in work)
 
 
 def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
@@ -194,7 +194,7 @@ def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
             "--scheduler", scheduler, "the address of a dask scheduler that answers", str(failure)
         ) from None
     with client:
-        futures = [client.submit(_one, *each[:3], True, pure=False, retries=1) for each in work]
+        futures = [client.submit(_one, *job[:3], True, pure=False, retries=1) for job in work]
         for done in as_completed(futures):
             yield done.result()
 
@@ -231,7 +231,7 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
             use_threads(1)
         checked = preflight(case)
         if checked.status == "error":
-            reasons = "; ".join(f"{each.key}: {each.reason}" for each in checked.issues if each.severity == "error")
+            reasons = "; ".join(f"{issue.key}: {issue.reason}" for issue in checked.issues if issue.severity == "error")
             return Outcome(str(folder), values, "refused", reasons)
         if not (folder / "run.json").exists():
             Run.begin(case, folder).go()
@@ -263,26 +263,26 @@ def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
 
     values = asdict(outcome) | {"seconds": seconds, "kept": kept}
     if outcome.status == "finished":
-        found = report(Path(outcome.folder))
-        means = {name: (each.mean, each.error, each.unit) for name, each in found.measures.items()}
-        if "rate" in found.impacts:
-            means["collision_rate"] = (found.impacts["rate"], math.nan, "1/s")
-        laws = {row.law: (row.expected, math.nan, row.unit) for row in found.laws}
+        result = report(Path(outcome.folder))
+        means = {name: (measure.mean, measure.error, measure.unit) for name, measure in result.measures.items()}
+        if "rate" in result.impacts:
+            means["collision_rate"] = (result.impacts["rate"], math.nan, "1/s")
+        laws = {row.law: (row.expected, math.nan, row.unit) for row in result.laws}
         values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
     return Outcome(**values)
 
 
 def write_table(outcomes: Sequence[Outcome], path: Path) -> None:
     """Write one line per run: name, changed values, status, means with errors, message."""
-    units = {name: unit for each in outcomes for name, (_, _, unit) in each.measures.items()}
+    units = {name: unit for outcome in outcomes for name, (_, _, unit) in outcome.measures.items()}
     fresh = path.with_name(f".{path.name}")
     with fresh.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         measures = [(f"{name} [{shown_unit(unit)}]", f"{name} error")[: _width(name)] for name, unit in units.items()]
         table.writerow(["run", *outcomes[0].values, "status", *itertools.chain(*measures), "message"])
-        for each in outcomes:
-            pairs = [each.measures.get(name, ("", "", ""))[: _width(name)] for name in units]
-            row = [each.name, *each.values.values(), each.status, *itertools.chain(*pairs), each.message]
+        for outcome in outcomes:
+            pairs = [outcome.measures.get(name, ("", "", ""))[: _width(name)] for name in units]
+            row = [outcome.name, *outcome.values.values(), outcome.status, *itertools.chain(*pairs), outcome.message]
             table.writerow(row)
     fresh.replace(path)
 
@@ -294,14 +294,14 @@ def _width(name: str) -> int:
 
 def _curves(cases: Iterable[Case]) -> list[Points]:
     """Measured curves against the inlet velocity that the first case names."""
-    found = [points_of(name, each) for case in itertools.islice(cases, 1) for name, each in case.compare.items()]
-    return [each for each in found if each.against == "inlet_velocity"]
+    curves = [points_of(name, table) for case in itertools.islice(cases, 1) for name, table in case.compare.items()]
+    return [points for points in curves if points.against == "inlet_velocity"]
 
 
 def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measured: Sequence[Points]) -> None:
     from cfddem.plotting.study_figures import Point, sample_figure, sweep_figure
 
-    points = [Point(each.values, each.measures) for each in outcomes if each.measures]
+    points = [Point(outcome.values, outcome.measures) for outcome in outcomes if outcome.measures]
     if sampled:
         sample_figure(points, path)
     else:
@@ -310,9 +310,9 @@ def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measur
 
 def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """One line for every run that did not finish."""
-    for each in outcomes:
-        if each.status != "finished":
-            yield f"{each.name}: {each.status}; {each.message}"
+    for outcome in outcomes:
+        if outcome.status != "finished":
+            yield f"{outcome.name}: {outcome.status}; {outcome.message}"
 
 
 # ---------------------------------------------------------------- a sweep as a job array
@@ -346,9 +346,9 @@ def write_jobs(
     shared = dict(overrides or {})
     runs = cases_of(path, over, shared)
     for name, (case, _) in runs.items():
-        found = [f"{each.key}: {each.reason}" for each in preflight(case).issues if each.severity == "error"]
-        if found:
-            raise InputError(f"run {name}", None, "a case without errors", "; ".join(found))
+        errors = [f"{issue.key}: {issue.reason}" for issue in preflight(case).issues if issue.severity == "error"]
+        if errors:
+            raise InputError(f"run {name}", None, "a case without errors", "; ".join(errors))
     make_output(output)
     output = output.absolute()
     program = Path(sys.executable).parent / "cfddem"
@@ -400,13 +400,13 @@ def open_sweep(folder: str | Path) -> pandas.DataFrame:
     units: dict[str, str] = {}
     names: dict[str, str] = {}
     for heading in table.columns:
-        if found := re.fullmatch(r"(.+?) \[(.*)\]", heading):
-            names[heading] = found[1]
-            units |= {found[1]: found[2], f"{found[1]}_error": found[2]}
+        if match := re.fullmatch(r"(.+?) \[(.*)\]", heading):
+            names[heading] = match[1]
+            units |= {match[1]: match[2], f"{match[1]}_error": match[2]}
         elif heading.endswith(" error"):
             names[heading] = f"{heading.removesuffix(' error')}_error"
-        elif found := re.search(r"\[([^\[\]]*)\]$", field_of(Case, heading.split(".")) or ""):
-            units[heading] = found[1]
+        elif match := re.search(r"\[([^\[\]]*)\]$", field_of(Case, heading.split(".")) or ""):
+            units[heading] = match[1]
     table = table.rename(columns=names)
     table.attrs["units"] = {name: units[name] for name in table.columns if name in units}
     return table  # type: ignore[no-any-return]
