@@ -54,10 +54,10 @@ def write(folder: Path, state: Mapping[str, Any]) -> Path:
         file.write(words.encode().ljust(_HEAD, b"\0"))
 
     write_hdf5(path, lambda file: _put(file, state, "state"), finish, userblock_size=_HEAD, track_order=True)
-    whole = [each for each in earlier if _fault(each) is None][: KEPT - 1]
-    for each in earlier:
-        if each not in whole:
-            each.unlink(missing_ok=True)
+    whole = [kept for kept in earlier if _fault(kept) is None][: KEPT - 1]
+    for kept in earlier:
+        if kept not in whole:
+            kept.unlink(missing_ok=True)
     return path
 
 
@@ -96,22 +96,22 @@ def newest(folder: Path, later: Sequence[str] = ()) -> dict[str, Any]:
     errors   InputError if there is none, or one of another format; RunFailed if all are damaged
     """
     home = Path(folder) / "checkpoint"
-    found = _files(home)
-    if not found:
+    paths = _files(home)
+    if not paths:
         raise InputError("folder", str(folder), "a run with a checkpoint", "delete the folder and run the case again")
-    for path in found:
+    for path in paths:
         fault = _fault(path)
         if fault is None:
             _require_format(path)
             with opened(path, "delete it; the previous one is used then") as data:
-                return _get(data.file, data, tuple(f"/{each}/" for each in later))
+                return _get(data.file, data, tuple(f"/{group}/" for group in later))
         _log.warning("%s: %s; using the previous checkpoint", path, fault)
-    raise RunFailed(f"{home}: all checkpoints are damaged ({len(found)}); delete the folder and run the case again")
+    raise RunFailed(f"{home}: all checkpoints are damaged ({len(paths)}); delete the folder and run the case again")
 
 
 def _files(home: Path) -> list[Path]:
     """Checkpoint files, newest first."""
-    return sorted((each for each in home.glob("*.h5") if each.stem.isdigit()), reverse=True)
+    return sorted((checkpoint for checkpoint in home.glob("*.h5") if checkpoint.stem.isdigit()), reverse=True)
 
 
 def _fault(path: Path) -> str | None:
@@ -173,13 +173,13 @@ def _get(group: Any, data: ArrayFile, later: tuple[str, ...]) -> dict[str, Any]:
     import h5py
 
     values: dict[str, Any] = {}
-    for name, each in group.items():
-        if isinstance(each, h5py.Group):
-            values[name] = _get(each, data, later)
+    for name, node in group.items():
+        if isinstance(node, h5py.Group):
+            values[name] = _get(node, data, later)
             continue
-        data.require_own(each)
-        if each.shape and later and f"{each.name}/".startswith(later):
-            values[name] = Stored(Path(each.file.filename), each)
+        data.require_own(node)
+        if node.shape and later and f"{node.name}/".startswith(later):
+            values[name] = Stored(Path(node.file.filename), node)
         else:
-            values[name] = json.loads(each[()]) if "json" in each.attrs else each[()]
+            values[name] = json.loads(node[()]) if "json" in node.attrs else node[()]
     return values

@@ -36,8 +36,8 @@ def damage_named(path: Path, remedy: str = "move the file elsewhere and retry") 
     except CfddemError:
         raise
     except _UNREADABLE as damage:
-        what = " ".join(str(damage).split())[:200]
-        raise RunFailed(f"{path}: the file is damaged ({what}); {remedy}") from damage
+        reason = " ".join(str(damage).split())[:200]
+        raise RunFailed(f"{path}: the file is damaged ({reason}); {remedy}") from damage
 
 
 def memory() -> float:
@@ -109,11 +109,11 @@ def require_about(about: Any) -> None:
     if about["precision"] not in ("single", "double"):
         raise ValueError("precision is neither single nor double")
     for names in about["quantities"].values():
-        for each in names.values():
-            if not 2 <= len(each) <= 3 or not all(isinstance(part, str) for part in each):
+        for quantity in names.values():
+            if not 2 <= len(quantity) <= 3 or not all(isinstance(part, str) for part in quantity):
                 raise ValueError("quantities are not pairs of unit and meaning")
     wall = about.get("wall_time", {})
-    if not isinstance(wall, dict) or not all(_is_number(each) for each in wall.values()):
+    if not isinstance(wall, dict) or not all(_is_number(number) for number in wall.values()):
         raise ValueError("wall_time is not a table of numbers")
     if not _is_number(about.get("averages_from") or 0.0):
         raise ValueError("averages_from is not a time")
@@ -126,7 +126,7 @@ def _require_grid(grid: Any) -> None:
     if not isinstance(grid, dict) or set(grid) != {"cells", "spacing", "origin"}:
         raise ValueError("grid is not a table of cells, spacing and origin")
     for name, values in grid.items():
-        good = isinstance(values, list) and len(values) == 3 and all(_is_number(each) for each in values)
+        good = isinstance(values, list) and len(values) == 3 and all(_is_number(number) for number in values)
         if not good or (name != "origin" and min(values) <= 0) or (name == "cells" and not _are_whole(values)):
             raise ValueError(f"grid.{name} is not three numbers")
 
@@ -136,7 +136,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _are_whole(values: list[Any]) -> bool:
-    return all(isinstance(each, int) for each in values)
+    return all(isinstance(number, int) for number in values)
 
 
 def require_columns(columns: Mapping[str, np.ndarray]) -> None:

@@ -36,10 +36,10 @@ def export(
     home = Path(f"{run.folder.resolve().name}-{kind}" if output is None else output)
     count = len(run.times)
     places = list(range(count)) if snapshots is None else list(snapshots)
-    for each in places:
-        if not -count <= each < count:
-            raise InputError("snapshot", each, f"from 0 to {count - 1}, or -1 for the last")
-    places = [each % count for each in places]
+    for place in places:
+        if not -count <= place < count:
+            raise InputError("snapshot", place, f"from 0 to {count - 1}, or -1 for the last")
+    places = [place % count for place in places]
     package = library({"vtu": "meshio", "csv": "pandas", "netcdf": "xarray"}[kind], "export", "export")
     if output is None:
         require_no_links(Path(), [home.name])
@@ -92,15 +92,15 @@ def _netcdf(run: RunData, home: Path, places: list[int], xarray: Any) -> list[Pa
         run.dataset()[run.fluid_fields].isel(time=places).to_netcdf(files[-1], engine="h5netcdf")
     for place in places:
         particles = {
-            name: (("particle", "component")[: each.ndim], each, {"units": run.unit(name)})
-            for name, each in run.particles(place).items()
+            name: (("particle", "component")[: array.ndim], array, {"units": run.unit(name)})
+            for name, array in run.particles(place).items()
         }
         if particles:
             instant = ((), run.times[place], {"units": "s"})
             write(f"particles-{place:08d}.nc", particles, {"time": instant, "component": ["x", "y", "z"]})
     if run.history:
         columns = {
-            name: ("time", each, {"units": run.unit(name)}) for name, each in run.history.items() if name != "time"
+            name: ("time", series, {"units": run.unit(name)}) for name, series in run.history.items() if name != "time"
         }
         write("history.nc", columns, {"time": ("time", run.history["time"], {"units": "s"})})
     return files
@@ -112,7 +112,7 @@ def _flat(run: RunData, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]
     for name, values in columns.items():
         unit = shown_unit(run.unit(name))
         parts = {name: values} if values.ndim == 1 else {f"{name}_{axis}": values[:, k] for k, axis in enumerate("xyz")}
-        flat |= {f"{part} [{unit}]" if unit != "-" else part: each for part, each in parts.items()}
+        flat |= {f"{part} [{unit}]" if unit != "-" else part: column for part, column in parts.items()}
     return flat
 
 
@@ -130,12 +130,12 @@ def _hexahedra(grid: Any) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
     low, high = row[:-1], row[1:]
     corners = [layer[around] for layer in (low, high) for around in _AROUND]
     return np.stack([x, y, z], axis=-1).reshape(-1, 3), [
-        ("hexahedron", np.stack([each.ravel() for each in corners], axis=1))
+        ("hexahedron", np.stack([corner.ravel() for corner in corners], axis=1))
     ]
 
 
 _FIRST, _SECOND = slice(None, -1), slice(1, None)
 _AROUND = tuple(
-    (slice(None), *each) for each in ((_FIRST, _FIRST), (_FIRST, _SECOND), (_SECOND, _SECOND), (_SECOND, _FIRST))
+    (slice(None), *corner) for corner in ((_FIRST, _FIRST), (_FIRST, _SECOND), (_SECOND, _SECOND), (_SECOND, _FIRST))
 )
 """Corners of a cell in a layer, counter-clockwise, as (y, x) slices."""

@@ -157,19 +157,19 @@ def reason(failure: OSError) -> str:
     return (failure.strerror or str(failure)).lower()
 
 
-def require_format(path: Path, found: int, expected: int, run: Path) -> None:
+def require_format(path: Path, version: int, expected: int, run: Path) -> None:
     """Refuse a file of another format.
 
-    found, expected  numbers of the formats
-    run              folder of the run that the file belongs to
+    version, expected  numbers of the formats
+    run                folder of the run that the file belongs to
     """
-    if found != expected:
+    if version != expected:
         remedy = (
             "it was written by a newer version of cfddem; update cfddem"
-            if found > expected
+            if version > expected
             else f"it was written by an earlier version of cfddem; run {run}/case.toml again in another folder"
         )
-        raise InputError(f"{path}: format", found, str(expected), remedy)
+        raise InputError(f"{path}: format", version, str(expected), remedy)
 
 
 def require_folder(output: Path | None) -> None:

@@ -56,7 +56,7 @@ def read_about(folder: Path) -> dict[str, Any]:
     except NotADirectoryError:
         raise InputError("folder", str(folder), "a run folder", "it is a file") from None
     except FileNotFoundError:
-        inside = [each.name for each in runs_inside(folder)]
+        inside = [run.name for run in runs_inside(folder)]
         why = "it contains no run.json" if folder.exists() else "it does not exist"
         if inside:
             why += f", but the runs {', '.join(inside[:MOST_NAMED])}" + " ..." * (len(inside) > MOST_NAMED)
@@ -65,8 +65,8 @@ def read_about(folder: Path) -> dict[str, Any]:
         raise disk_error("read", path, failure) from failure
     with damage_named(path, remedy):
         about: dict[str, Any] = json.loads(text)
-        found = int(about["format"])
-    require_format(path, found, FORMAT, folder)
+        version_of_run = int(about["format"])
+    require_format(path, version_of_run, FORMAT, folder)
     with damage_named(path, remedy):
         require_about(about)
     return about
@@ -74,17 +74,17 @@ def read_about(folder: Path) -> dict[str, Any]:
 
 def runs_inside(folder: Path) -> list[Path]:
     """Run folders inside a folder, such as that of a sweep, by name."""
-    return sorted(each.parent for each in folder.glob("*/run.json"))
+    return sorted(path.parent for path in folder.glob("*/run.json"))
 
 
 def scan(folder: Path) -> tuple[list[Snapshot], Layout | None]:
     """All snapshots of a run, read from the data files, and their layout."""
-    found: list[Snapshot] = []
+    snapshots: list[Snapshot] = []
     layout = None
-    for path in sorted(each for each in (folder / "data").glob("*.h5") if NUMBERED.fullmatch(each.name)):
+    for path in sorted(file for file in (folder / "data").glob("*.h5") if NUMBERED.fullmatch(file.name)):
         snapshot, layout = read_snapshot_header(path)
-        found.append(snapshot)
-    return found, layout
+        snapshots.append(snapshot)
+    return snapshots, layout
 
 
 def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
@@ -95,8 +95,8 @@ def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
     with opened(path) as data:
         file = data.file
         fluid, particles = file.get("fluid", {}), file.get("particles", {})
-        for each in (*fluid.values(), *particles.values()):
-            data.require_own(each)
+        for dataset in (*fluid.values(), *particles.values()):
+            data.require_own(dataset)
         count = len(particles[POINTS]) if POINTS in particles else 0
         snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
         return snapshot, Layout.of(fluid, particles)
@@ -110,7 +110,7 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
     if not path.exists():
         return {}
     with opened(path) as data:
-        columns = {name: data.read(each) for name, each in data.file.items()}
+        columns = {name: data.read(dataset) for name, dataset in data.file.items()}
         require_columns(columns)
         if columns and "time" not in columns:
             raise ValueError("it has no column time")
@@ -145,10 +145,10 @@ def require_no_foreign_files(folder: Path) -> None:
 
     errors  InputError
     """
-    inside = [each.name for each in folder.iterdir()] if folder.is_dir() else []
-    found = sorted(name for name in inside if name not in OWN_FILES and not name.startswith("."))
-    if found:
-        names = ", ".join(found[:MOST_NAMED]) + " ..." * (len(found) > MOST_NAMED)
+    inside = [path.name for path in folder.iterdir()] if folder.is_dir() else []
+    foreign = sorted(name for name in inside if name not in OWN_FILES and not name.startswith("."))
+    if foreign:
+        names = ", ".join(foreign[:MOST_NAMED]) + " ..." * (len(foreign) > MOST_NAMED)
         raise InputError("output", str(folder), f"a new or empty folder ({names} found)", "choose another folder")
 
 
@@ -204,7 +204,7 @@ def provenance(seed: int | None = None) -> dict[str, Any]:
 
 def _dependencies() -> dict[str, str]:
     """Installed version of each required package."""
-    found = {}
+    versions = {}
     try:
         needed = requires("cfddem") or []
     except PackageNotFoundError:  # cfddem is used without being installed
@@ -214,10 +214,10 @@ def _dependencies() -> dict[str, str]:
             continue
         name = requirement.split(";")[0].split(">")[0].split("=")[0].split("<")[0].strip()
         try:
-            found[name] = version(name)
+            versions[name] = version(name)
         except PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 # ---------------------------------------------------------------- copies of the files of a case

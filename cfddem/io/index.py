@@ -60,8 +60,11 @@ class Layout:
     def of(cls, fluid: Mapping[str, Any], particles: Mapping[str, Any]) -> Layout:
         """The layout of the arrays or datasets of one snapshot."""
         return cls(
-            {name: (np.dtype(each.dtype).str, tuple(each.shape[4:])) for name, each in sorted(fluid.items())},
-            {name: (np.dtype(each.dtype).str, tuple(each.shape[1:])) for name, each in sorted(particles.items())},
+            {name: (np.dtype(dataset.dtype).str, tuple(dataset.shape[4:])) for name, dataset in sorted(fluid.items())},
+            {
+                name: (np.dtype(dataset.dtype).str, tuple(dataset.shape[1:]))
+                for name, dataset in sorted(particles.items())
+            },
         )
 
     def require_same(self, other: Layout) -> None:
@@ -70,9 +73,9 @@ class Layout:
         errors  InputError
         """
         for block in ("fluid", "particles"):
-            mine, given = getattr(self, block), getattr(other, block)
-            if mine != given:
-                names = sorted(name for name in {*mine, *given} if mine.get(name) != given.get(name))
+            mine, others = getattr(self, block), getattr(other, block)
+            if mine != others:
+                names = sorted(name for name in {*mine, *others} if mine.get(name) != others.get(name))
                 raise InputError(
                     f"snapshot.{block}",
                     names,
@@ -113,9 +116,9 @@ def index(
             root[block].attrs["Index"] = place
             assembly[block] = h5py.SoftLink(f"/VTKHDF/{block}")
         table = file.create_group("snapshots")
-        table["name"] = np.array([each.name.encode() for each in snapshots])
+        table["name"] = np.array([snapshot.name.encode() for snapshot in snapshots])
         for column in ("time", "step", "particles"):
-            table[column] = np.array([getattr(each, column) for each in snapshots])
+            table[column] = np.array([getattr(snapshot, column) for snapshot in snapshots])
     return image.getvalue()
 
 
@@ -144,7 +147,7 @@ def _fluid(group: Any, snapshots: Sequence[Snapshot], layout: Layout, box: GridB
     steps, rows = _steps(group, snapshots), _at_least_two(np.arange(len(snapshots)))
     data, offsets = group.create_group("CellData"), steps.create_group("CellDataOffsets")
     group.create_group("PointData")
-    parts = [(each.name, 1) for each in snapshots]
+    parts = [(snapshot.name, 1) for snapshot in snapshots]
     for name, (kind, further) in layout.fluid.items():
         dataset = _virtual(data, name, parts, f"fluid/{name}", kind, (*box.shape, *further))
         describe(dataset, declared(quantities, "fluid", name))
@@ -154,8 +157,8 @@ def _fluid(group: Any, snapshots: Sequence[Snapshot], layout: Layout, box: GridB
 def _particles(group: Any, snapshots: Sequence[Snapshot], layout: Layout, quantities: Quantities) -> None:
     """A PolyData with the points of all snapshots; one cell holds all points of a step."""
     _stamp(group, "PolyData")
-    parts = [(each.name, each.particles) for each in snapshots]
-    counts = [each.particles for each in snapshots]
+    parts = [(snapshot.name, snapshot.particles) for snapshot in snapshots]
+    counts = [snapshot.particles for snapshot in snapshots]
     begins, shown = _at_least_two(np.concatenate([[0], np.cumsum(counts)[:-1]])), _at_least_two(np.array(counts))
     many, steps = len(shown), _steps(group, snapshots)
     group["NumberOfPoints"] = shown
@@ -219,7 +222,7 @@ def _stamp(group: Any, kind: str) -> None:
 
 def _steps(group: Any, snapshots: Sequence[Snapshot]) -> Any:
     """The times of a block."""
-    times = np.array([each.time for each in snapshots])
+    times = np.array([snapshot.time for snapshot in snapshots])
     if len(times) == 1:
         times = np.array([times[0], np.nextafter(times[0], np.inf)])
     steps = group.create_group("Steps")

@@ -61,7 +61,9 @@ def of_function(function: Callable[..., Any], unit: str, group: str) -> Quantity
 
 def from_json(blocks: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Quantity]]:
     """The quantities of a run as `run.json` holds them."""
-    return {block: {name: Quantity(*each) for name, each in names.items()} for block, names in blocks.items()}
+    return {
+        block: {name: Quantity(*properties) for name, properties in names.items()} for block, names in blocks.items()
+    }
 
 
 def declared(quantities: Quantities, block: str, name: str) -> Quantity:

@@ -56,15 +56,15 @@ def newest_run(place: Path) -> Path:
 
     errors  InputError if there is none
     """
-    found = [path for path in (place / "run.json", *place.glob("*/run.json")) if path.exists()]
-    if not found:
+    runs = [path for path in (place / "run.json", *place.glob("*/run.json")) if path.exists()]
+    if not runs:
         raise InputError("folder", None, "a run folder", f"there is none in {place.resolve()}")
-    return max(found, key=_last_change).parent
+    return max(runs, key=_last_change).parent
 
 
 def _last_change(about: Path) -> float:
     """When a run folder with this `run.json` was last written [s]."""
-    return max(each.stat().st_mtime for each in (about, about.with_name("data")) if each.exists())
+    return max(path.stat().st_mtime for path in (about, about.with_name("data")) if path.exists())
 
 
 class Columns(dict[str, np.ndarray]):
@@ -82,7 +82,7 @@ class RunData:
         self.about = read_about(folder)
         self.quantities = from_json(self.about["quantities"])
         grid = self.about["grid"]
-        self.grid = None if grid is None else GridBox(**{key: tuple(each) for key, each in grid.items()})
+        self.grid = None if grid is None else GridBox(**{key: tuple(values) for key, values in grid.items()})
         self.snapshots, self.missing = self._find()
         if self.missing:
             shown = ", ".join(self.missing[:3]) + (" ..." if len(self.missing) > 3 else "")
@@ -135,12 +135,12 @@ class RunData:
     @cached_property
     def times(self) -> np.ndarray:
         """Time of each snapshot [s]."""
-        return np.array([each.time for each in self.snapshots])
+        return np.array([snapshot.time for snapshot in self.snapshots])
 
     @cached_property
     def steps(self) -> np.ndarray:
         """Particle steps up to each snapshot."""
-        return np.array([each.step for each in self.snapshots], np.int64)
+        return np.array([snapshot.step for snapshot in self.snapshots], np.int64)
 
     @property
     def fluid_fields(self) -> list[str]:
@@ -160,8 +160,8 @@ class RunData:
         for block in ("history", "particles", "fluid", "collisions"):
             if name in self.quantities.get(block, {}):
                 return self.quantities[block][name]
-        known = {each for names in self.quantities.values() for each in names}
-        raise InputError("quantity", name, nearest(name, sorted(known)))
+        names = {quantity for block in self.quantities.values() for quantity in block}
+        raise InputError("quantity", name, nearest(name, sorted(names)))
 
     def unit(self, name: str) -> str:
         """Unit of a field or column, `1` for a plain number."""
@@ -180,7 +180,7 @@ class RunData:
     def particles(self, snapshot: int = -1) -> dict[str, np.ndarray]:
         """All particle fields of one snapshot, one row per particle, in the order of ids."""
         with self._opened(snapshot) as data:
-            fields = {field_name(name): data.read(each) for name, each in data.file.get("particles", {}).items()}
+            fields = {field_name(name): data.read(dataset) for name, dataset in data.file.get("particles", {}).items()}
             require_particles(fields)
             return fields
 
@@ -198,8 +198,8 @@ class RunData:
                 at = int(np.searchsorted(ids, particle))
                 if at < len(ids) and ids[at] == particle:
                     rows["time"].append(time)
-                    for name, each in group.items():
-                        rows.setdefault(field_name(name), []).append(data.read(each, at))
+                    for name, dataset in group.items():
+                        rows.setdefault(field_name(name), []).append(data.read(dataset, at))
         if not rows["time"]:
             raise InputError("particle", particle, "the id of a particle in this run")
         return {name: np.array(values) for name, values in rows.items()}
@@ -214,15 +214,15 @@ class RunData:
         """All completed collisions, name -> column; empty if the run records none."""
         parts: dict[str, list[np.ndarray]] = {}
         for place in range(len(self.snapshots)):
-            for name, each in self.collisions_of(place).items():
-                parts.setdefault(name, []).append(each)
-        return {name: np.concatenate(each) for name, each in parts.items()}
+            for name, column in self.collisions_of(place).items():
+                parts.setdefault(name, []).append(column)
+        return {name: np.concatenate(pieces) for name, pieces in parts.items()}
 
     def collisions_of(self, snapshot: int) -> dict[str, np.ndarray]:
         """The collisions that were completed between the previous snapshot and this one; empty without a record."""
         with self._opened(snapshot) as data:
-            columns = {name: data.read(each) for name, each in data.file.get("collisions", {}).items()}
-            require_columns({name: each for name, each in columns.items() if name != "place"})
+            columns = {name: data.read(dataset) for name, dataset in data.file.get("collisions", {}).items()}
+            require_columns({name: column for name, column in columns.items() if name != "place"})
             return columns
 
     def mesh(self, snapshot: int = -1) -> pyvista.MultiBlock:
@@ -285,10 +285,10 @@ class RunData:
         variables: dict[str, Any] = {}
         forms: dict[str, np.ndarray] = {}
         with self._opened(-1) as data:
-            for key, each in data.file[block].items():
+            for key, dataset in data.file[block].items():
                 name = field_name(key)
-                data.require_own(each)
-                form = blank(each.dtype, each.shape[1:] if block == "fluid" else each.shape)
+                data.require_own(dataset)
+                form = blank(dataset.dtype, dataset.shape[1:] if block == "fluid" else dataset.shape)
                 if self.grid is not None and block == "fluid":
                     require_cells(form, name, self.grid.shape)
                 forms[name] = form
@@ -313,7 +313,7 @@ class RunData:
 
     def _common_ids(self) -> np.ndarray | None:
         """The ids of the particles if all snapshots hold the same ones, else None."""
-        if "id" not in self.particle_fields or len({each.particles for each in self.snapshots}) != 1:
+        if "id" not in self.particle_fields or len({snapshot.particles for snapshot in self.snapshots}) != 1:
             return None
         ids = self._particle_field("id", -1)
         same = (np.array_equal(ids, self._particle_field("id", place)) for place in range(len(self.snapshots) - 1))
@@ -325,16 +325,20 @@ class RunData:
         Snapshots are numbered without a gap, so a gap is a loss.
         """
         present = {path.name for path in (self.folder / "data").glob("*.h5") if NUMBERED.fullmatch(path.name)}
-        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf") if NUMBERED.fullmatch(each.name)}
-        found = [
-            known[name] if name in known else read_snapshot_header(self.folder / "data" / name)[0]
+        indexed = {
+            snapshot.name: snapshot
+            for snapshot in _indexed(self.folder / "run.vtkhdf")
+            if NUMBERED.fullmatch(snapshot.name)
+        }
+        snapshots = [
+            indexed[name] if name in indexed else read_snapshot_header(self.folder / "data" / name)[0]
             for name in sorted(present)
         ]
-        last = max((int(name[:8]) for name in {*present, *known}), default=-1)
-        if last > MOST_MISSING * (len(found) + MOST_MISSING):
-            limit = f"the folder has {len(found)} snapshots; move a file that is not of this run elsewhere"
+        last = max((int(name[:8]) for name in {*present, *indexed}), default=-1)
+        if last > MOST_MISSING * (len(snapshots) + MOST_MISSING):
+            limit = f"the folder has {len(snapshots)} snapshots; move a file that is not of this run elsewhere"
             raise RunFailed(f"{self.folder / 'data'}: there is no snapshot {last:08d}.h5, as {limit}")
-        return found, [name for name in (f"{k:08d}.h5" for k in range(last + 1)) if name not in present]
+        return snapshots, [name for name in (f"{k:08d}.h5" for k in range(last + 1)) if name not in present]
 
     @cached_property
     def _names(self) -> dict[str, list[str]]:
@@ -353,9 +357,9 @@ class RunData:
         with opened(self.folder / "data" / self.snapshots[snapshot].name) as data:
             yield data
 
-    def _require_name(self, name: str, known: list[str], where: str) -> None:
-        if name not in known:
-            raise InputError(f"{where} field", name, nearest(name, known))
+    def _require_name(self, name: str, names: list[str], where: str) -> None:
+        if name not in names:
+            raise InputError(f"{where} field", name, nearest(name, names))
 
 
 def _indexed(path: Path) -> list[Snapshot]:

@@ -51,7 +51,7 @@ class RunFolder:
         self.folder, self.case_text, self.about = folder, case_text, about
         self.quantities = from_json(about["quantities"])
         self.box = (
-            None if about["grid"] is None else GridBox(**{key: tuple(each) for key, each in about["grid"].items()})
+            None if about["grid"] is None else GridBox(**{key: tuple(values) for key, values in about["grid"].items()})
         )
         self.snapshots: list[Snapshot] = []
         self._layout: Layout | None = None
@@ -223,16 +223,16 @@ class RunFolder:
 
         The index is rewritten first, so that it never refers to a removed snapshot.
         """
-        late = [each for each in self.snapshots if each.time > time]
+        late = [snapshot for snapshot in self.snapshots if snapshot.time > time]
         self.snapshots = self.snapshots[: len(self.snapshots) - len(late)]
         if not self.snapshots:
             self._layout = None
         self.write_index()
-        for each in reversed(late):
-            (self.folder / "data" / each.name).unlink(missing_ok=True)
+        for snapshot in reversed(late):
+            (self.folder / "data" / snapshot.name).unlink(missing_ok=True)
         if self._history:
             kept = np.frombuffer(self._history["time"]) <= time
-            self._history = {name: array("d", np.frombuffer(each)[kept]) for name, each in self._history.items()}
+            self._history = {name: array("d", np.frombuffer(series)[kept]) for name, series in self._history.items()}
             self._history_is_new = True
             self.flush_history()
 
@@ -333,7 +333,7 @@ def _columns(table: np.ndarray | None) -> dict[str, np.ndarray]:
     if table is None:
         return {}
     columns = {name: table[name] for name in table.dtype.names or ()}
-    return {name: each.astype("u1") if each.dtype.kind == "b" else each for name, each in columns.items()}
+    return {name: column.astype("u1") if column.dtype.kind == "b" else column for name, column in columns.items()}
 
 
 # ---------------------------------------------------------------- folders of several ranks
@@ -368,11 +368,11 @@ def folder_of_ranks(communicator: Communicator, make: Callable[[], RunFolder]) -
 
     make  called on rank 0
     """
-    made: list[RunFolder] = []
+    folders: list[RunFolder] = []
 
     def described() -> tuple[Path, dict[str, Any], str, Quantities]:
-        made.append(make())
-        return made[0].folder, made[0].about, made[0].case_text, made[0].quantities
+        folders.append(make())
+        return folders[0].folder, folders[0].about, folders[0].case_text, folders[0].quantities
 
     about = communicator.by_first(described)
-    return made[0] if made else UnwrittenFolder(*about)
+    return folders[0] if folders else UnwrittenFolder(*about)
