@@ -50,8 +50,8 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
         rows.append(comparison("pressure drop and wall load by the weight", carried, weight, "Pa"))
     if is_compared(case):
         voidage = measures[FROM_HEIGHT].mean
-        for each in expansions(case).held:
-            rows.append(comparison(f"voidage by {each.law}", voidage, each.voidage, "1", each.outside))
+        for expansion in expansions(case).held:
+            rows.append(comparison(f"voidage by {expansion.law}", voidage, expansion.voidage, "1", expansion.outside))
     return rows
 
 
@@ -76,7 +76,7 @@ def expansion_note(case: Case, laws: list[LawComparison], measures: Mapping[str,
     measures  of the report
     returns   a few sentences; empty if no voidage is compared
     """
-    rows = [each for each in laws if each.law.startswith("voidage by ")]
+    rows = [law for law in laws if law.law.startswith("voidage by ")]
     if not rows:
         return ""
     low, high = (pick(row.expected for row in rows) for pick in (min, max))
@@ -84,8 +84,12 @@ def expansion_note(case: Case, laws: list[LawComparison], measures: Mapping[str,
     off = max(low - computed, computed - high)
     where = f"{off:.3f} {'below' if computed < low else 'above'} them" if off > 0.0 else "within"
     note = f"the published voidages differ by {high - low:.3f}, {low:.3f} to {high:.3f}; that of the run lies {where}"
-    found = expansions(case)
-    note += "".join(f". {each[0].upper()}{each[1:]}" for each in (spread_in_words(found), _beyond(found)) if each)
+    estimates = expansions(case)
+    note += "".join(
+        f". {sentence[0].upper()}{sentence[1:]}"
+        for sentence in (spread_in_words(estimates), _beyond(estimates))
+        if sentence
+    )
     if FROM_PRESSURE in measures:
         other = measures[FROM_PRESSURE].mean - computed
         note += (
@@ -95,16 +99,16 @@ def expansion_note(case: Case, laws: list[LawComparison], measures: Mapping[str,
     return note
 
 
-def _beyond(found: Expansions) -> str:
+def _beyond(estimates: Expansions) -> str:
     """Laws that are not compared because they do not hold for a bed, in words; empty if there are none."""
-    others = [each for each in found.every if each not in found.held]
-    given = ", ".join(f"{each.law} {each.voidage:.3f} ({each.outside})" for each in others)
-    return f"outside of their ranges: {given}" if others else ""
+    others = [expansion for expansion in estimates.every if expansion not in estimates.held]
+    voidages = ", ".join(f"{expansion.law} {expansion.voidage:.3f} ({expansion.outside})" for expansion in others)
+    return f"outside of their ranges: {voidages}" if others else ""
 
 
 def expansion_laws(case: Case) -> dict[str, float]:
     """Voidage of a liquid-fluidised bed by each published expansion law that holds for it [-]."""
-    return {each.law: each.voidage for each in expansions(case).held}
+    return {expansion.law: expansion.voidage for expansion in expansions(case).held}
 
 
 def buoyant_weight(case: Case) -> float:
@@ -185,7 +189,7 @@ def slip_velocity(run: RunData, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and velocities [m/s] of the sphere relative to the mean fluid velocity, up to its first contact."""
     history = run.history
     contacts = history["time"][history["contact_count"] > 0.0]
-    end, held = contacts.min(initial=math.inf), open_share(grid_of(case))
+    end, shares = contacts.min(initial=math.inf), open_share(grid_of(case))
     before = np.flatnonzero(run.times < end)
     chosen = before[np.unique(np.linspace(0, len(before) - 1, min(len(before), MOST_SNAPSHOTS)).astype(int))]
     times, slip = [], []
@@ -193,6 +197,6 @@ def slip_velocity(run: RunData, case: Case) -> tuple[np.ndarray, np.ndarray]:
         velocity = run.particles(place)["velocity"]
         if len(velocity):  # the sphere may have left the column
             times.append(run.times[place])
-            of_fluid = run.fluid("velocity", place) * held[..., None]
-            slip.append(velocity[0] - of_fluid.mean(axis=(0, 1, 2)) / float(held.mean()))
+            of_fluid = run.fluid("velocity", place) * shares[..., None]
+            slip.append(velocity[0] - of_fluid.mean(axis=(0, 1, 2)) / float(shares.mean()))
     return np.array(times), np.array(slip, float).reshape(-1, 3)

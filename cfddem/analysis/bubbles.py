@@ -59,15 +59,15 @@ def find_bubbles(
     free[0] = False
     free[np.unique(labels[top - 1])] = False
     chosen = np.flatnonzero(free & (cells >= smallest))
-    found = np.zeros(len(chosen), BUBBLE)
-    found["volume"] = cells[chosen] * np.prod(spacing)
-    found["centroid"] = _centroids(labels, chosen, spacing, origin, (*periodic, False))
+    bubbles = np.zeros(len(chosen), BUBBLE)
+    bubbles["volume"] = cells[chosen] * np.prod(spacing)
+    bubbles["centroid"] = _centroids(labels, chosen, spacing, origin, (*periodic, False))
     if flat:
         depth = voidage.shape[1] * spacing[1]
-        found["diameter"] = np.sqrt(4.0 * found["volume"] / (np.pi * depth))
+        bubbles["diameter"] = np.sqrt(4.0 * bubbles["volume"] / (np.pi * depth))
     else:
-        found["diameter"] = np.cbrt(6.0 * found["volume"] / np.pi)
-    return found[np.argsort(found["centroid"][:, 2])]
+        bubbles["diameter"] = np.cbrt(6.0 * bubbles["volume"] / np.pi)
+    return bubbles[np.argsort(bubbles["centroid"][:, 2])]
 
 
 def _joined_across(labels: NDArray[np.int32], count: int, periodic: tuple[bool, bool]) -> tuple[np.ndarray, int]:

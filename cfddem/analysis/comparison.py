@@ -48,7 +48,7 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
     numbers = [_numbers(result) for result in results]
     measures = {}
     for name, first in numbers[0].items():
-        rows = [each.get(name) for each in numbers]
+        rows = [numbers_of_run.get(name) for numbers_of_run in numbers]
         if sum(row is not None for row in rows) > 1 and any(row and row["mean"] != 0.0 for row in rows):
             measures[name] = {"unit": first["unit"], "runs": [_difference(row, first) for row in rows]}
     return {
@@ -70,10 +70,10 @@ def distinct_names(folders: Sequence[Path]) -> list[str]:
     """
     parts = [folder.absolute().parts for folder in folders]
     for length in range(1, max(map(len, parts)) + 1):
-        names = ["/".join(each[-length:]) for each in parts]
+        names = ["/".join(parts_of_run[-length:]) for parts_of_run in parts]
         if len(set(names)) == len(names):
             return names
-    return [f"{Path(*each).name} ({place})" for place, each in enumerate(parts, 1)]
+    return [f"{Path(*parts_of_run).name} ({place})" for place, parts_of_run in enumerate(parts, 1)]
 
 
 def run_names(folders: Sequence[Path], keys: Mapping[str, Sequence[Any]]) -> list[str]:
@@ -92,9 +92,9 @@ def run_names(folders: Sequence[Path], keys: Mapping[str, Sequence[Any]]) -> lis
     names = distinct_names(folders)
     if max(map(len, names)) <= LONGEST_NAME:
         return names
-    values = [", ".join("-" if each is None else f"{each}" for each in row) for row in zip(*keys.values())]
+    values = [", ".join("-" if value is None else f"{value}" for value in row) for row in zip(*keys.values())]
     if len(keys) == 1:
-        values = [f"{next(iter(keys)).split('.')[-1]} {each}" for each in values]
+        values = [f"{next(iter(keys)).split('.')[-1]} {title}" for title in values]
     if len(set(values)) == len(names) and max(map(len, values)) <= max(map(len, names)):
         return values
     common = re.match(r"(.*[-_/])?", os.path.commonprefix(names))  # noqa: RUF071  character by character
@@ -107,8 +107,8 @@ def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
     Copies of one file do not differ.
     """
     flat = [dict(_values(case.model_dump(mode="json", fallback=_law_name), "")) for case in cases]
-    keys = dict.fromkeys(key for each in flat for key in each)
-    rows = {key: [each.get(key) for each in flat] for key in keys}
+    keys = dict.fromkeys(key for values in flat for key in values)
+    rows = {key: [values.get(key) for values in flat] for key in keys}
     differ = {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
     return {key: values for key, values in differ.items() if not _same_files(key, values)}
 
@@ -118,7 +118,7 @@ def _same_files(key: str, files: Sequence[Any]) -> bool:
     if not key.endswith(".file") or None in files:
         return False
     try:
-        return len({Path(each).read_bytes() for each in files}) == 1
+        return len({Path(file).read_bytes() for file in files}) == 1
     except OSError:
         return False
 
@@ -126,8 +126,8 @@ def _same_files(key: str, files: Sequence[Any]) -> bool:
 def _changed_laws(runs: Sequence[RunData]) -> dict[str, list[Any]]:
     """Fingerprints of users' laws that differ, with that of each run; None where a run has no such law."""
     used: list[dict[str, Any]] = [run.provenance.get("laws", {}) for run in runs]
-    kinds = dict.fromkeys(kind for each in used for kind in each)
-    rows = {f"laws.{kind}, source": [each.get(kind, {}).get("fingerprint") for each in used] for kind in kinds}
+    kinds = dict.fromkeys(kind for laws in used for kind in laws)
+    rows = {f"laws.{kind}, source": [laws.get(kind, {}).get("fingerprint") for laws in used] for kind in kinds}
     return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
 
 
@@ -177,20 +177,20 @@ def _judged(z: float, rows: Sequence[dict[str, Any]]) -> tuple[float, str]:
 def _numbers(result: Report) -> dict[str, dict[str, Any]]:
     """The key results of a report that are numbers, and then all other means, by their names."""
     first = {
-        each.name.replace(" ", "_"): {**asdict(each), "mean": each.value, "stationary": None}
-        for each in result.key_results
-        if not isinstance(each.value, str)
+        key_result.name.replace(" ", "_"): {**asdict(key_result), "mean": key_result.value, "stationary": None}
+        for key_result in result.key_results
+        if not isinstance(key_result.value, str)
     }
-    return first | {name: asdict(each) for name, each in result.measures.items()}
+    return first | {name: asdict(mean) for name, mean in result.measures.items()}
 
 
 def _key_results(results: Sequence[Report]) -> dict[str, list[KeyResult | None]]:
     """The key results of all runs by name."""
-    found: dict[str, list[KeyResult | None]] = {}
+    by_name: dict[str, list[KeyResult | None]] = {}
     for place, result in enumerate(results):
-        for each in result.key_results:
-            found.setdefault(each.name, [None] * len(results))[place] = each
-    return found
+        for key_result in result.key_results:
+            by_name.setdefault(key_result.name, [None] * len(results))[place] = key_result
+    return by_name
 
 
 def _law_name(value: Any) -> str:
@@ -200,11 +200,11 @@ def _law_name(value: Any) -> str:
 def _values(values: Any, key: str) -> Iterator[tuple[str, Any]]:
     """Every value of nested tables, with its dotted key; lists of numbers are one value."""
     if isinstance(values, Mapping):
-        for name, each in values.items():
-            yield from _values(each, f"{key}.{name}".lstrip("."))
+        for name, value in values.items():
+            yield from _values(value, f"{key}.{name}".lstrip("."))
     elif isinstance(values, list) and values and isinstance(values[0], Mapping):
-        for place, each in enumerate(values):
-            yield from _values(each, f"{key}.{place}")
+        for place, value in enumerate(values):
+            yield from _values(value, f"{key}.{place}")
     else:
         yield key, values
 
@@ -213,14 +213,14 @@ def _values(values: Any, key: str) -> Iterator[tuple[str, Any]]:
 
 
 def _runs(result: dict[str, Any]) -> Iterator[str]:
-    for place, each in enumerate(result["runs"]):
-        begin, end = each["window"]
+    for place, run in enumerate(result["runs"]):
+        begin, end = run["window"]
         head = "reference" if place == 0 else ""
-        name = each["name"] if each["folder"].endswith(each["name"]) else f"{each['name']} ({each['folder']})"
-        yield f"{head:<10} {name}: {each['status']}; means from {begin:g} to {end:g} s"
+        name = run["name"] if run["folder"].endswith(run["name"]) else f"{run['name']} ({run['folder']})"
+        yield f"{head:<10} {name}: {run['status']}; means from {begin:g} to {end:g} s"
     for name, row in result["key_results"].items():
-        if any(each is not None and isinstance(each.value, str) for each in row):
-            words = "; ".join(str(each.value) if each else "-" for each in row)
+        if any(key_result is not None and isinstance(key_result.value, str) for key_result in row):
+            words = "; ".join(str(key_result.value) if key_result else "-" for key_result in row)
             yield from textwrap.wrap(f"{name:<10} {words}", WIDTH, subsequent_indent=" " * 11)
 
 
@@ -228,12 +228,12 @@ def _changes(keys: dict[str, list[Any]]) -> Iterator[str]:
     yield ""
     yield "keys of the cases that differ" if keys else "the cases are the same"
     for key, values in keys.items():
-        text = "  ".join("-" if each is None else f"{each}"[:40] for each in values)
+        text = "  ".join("-" if value is None else f"{value}"[:40] for value in values)
         yield from textwrap.wrap(f"  {key:<28} {text}", WIDTH, subsequent_indent=" " * 31)
 
 
 def _means(result: dict[str, Any]) -> Iterator[str]:
-    names = [each["name"] for each in result["runs"]]
+    names = [run["name"] for run in result["runs"]]
     wide = min(30, max(map(len, names)))
     for name, measure in result["measures"].items():
         yield ""

@@ -52,8 +52,8 @@ class Defluidisation:
             f"the pressure drop is below {100.0 * CARRIED:g} % of the weight" * self.passed,
         ]
         reasons = " and ".join(filter(None, signs))
-        held = f"; the largest agglomerate holds {100.0 * self.largest_share:.0f} % of the particles"
-        return f"defluidised from t = {self.time:.3g} s on: {reasons}{held}"
+        largest = f"; the largest agglomerate holds {100.0 * self.largest_share:.0f} % of the particles"
+        return f"defluidised from t = {self.time:.3g} s on: {reasons}{largest}"
 
 
 def defluidisation_of(run: RunData, case: Case) -> Defluidisation | None:

@@ -110,7 +110,7 @@ def spreading(
     return Spreading(np.array(several) * float(np.diff(time).mean()), square.reshape(-1, 3))
 
 
-def dispersion(found: Spreading, after: float = 0.0) -> Array:
+def dispersion(spreading: Spreading, after: float = 0.0) -> Array:
     r"""Coefficients of dispersion along x, y, z: half of the slope of the mean square displacement [m2/s].
 
     .. math:: D_i = \tfrac12\,\frac{d\langle\Delta x_i^2\rangle}{dt}
@@ -118,10 +118,10 @@ def dispersion(found: Spreading, after: float = 0.0) -> Array:
     after    lags to use begin here; take several correlation times of the velocity [s]
     returns  (3,) [m2/s]; NaN with fewer than two lags
     """
-    late = found.lag >= after
+    late = spreading.lag >= after
     if late.sum() < 2:
         return np.full(3, np.nan)
-    return np.asarray(0.5 * np.polyfit(found.lag[late], found.square[late], 1)[0])
+    return np.asarray(0.5 * np.polyfit(spreading.lag[late], spreading.square[late], 1)[0])
 
 
 # ---------------------------------------------------------------- the regime map of collisions
@@ -164,8 +164,8 @@ def regime_map(collisions: Mapping[str, Array], per_decade: int = PER_DECADE) ->
     contact = columns["closest_gap"] < columns["minimum_gap"]
     edges = _edges(stokes, per_decade), _edges(gap_ratio, per_decade)
     counted, in_contact = (
-        np.histogram2d(gap_ratio, stokes, bins=(edges[1], edges[0]), weights=each)[0]
-        for each in (weight, weight * contact)
+        np.histogram2d(gap_ratio, stokes, bins=(edges[1], edges[0]), weights=weights)[0]
+        for weights in (weight, weight * contact)
     )
     order, total = np.argsort(stokes), float(weight.sum())
     return RegimeMap(

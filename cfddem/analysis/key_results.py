@@ -59,17 +59,17 @@ def key_results(
     measures, laws  of :func:`cfddem.analysis.report.report`
     defluidised     a wet bed has come to rest although it is blown
     """
-    found = [
+    results = [
         *_speed(laws),
         *_height(case, measures, laws),
         *_voidage(case, measures, laws),
         *_drop(case, measures, laws),
     ]
-    found += _particles(run)
+    results += _particles(run)
     regime, reason, holds = _classified(run, case, measures)
     if defluidised:
         regime, holds = "defluidised", False
-    return [*found, KeyResult("regime", regime, math.nan, "", reason, holds)]
+    return [*results, KeyResult("regime", regime, math.nan, "", reason, holds)]
 
 
 def agreement(computed: float, error: float, expected: float, name: str) -> tuple[str, bool | None]:
@@ -139,7 +139,7 @@ def _height(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawCompa
     published = _published(laws)
     if published:
         solids = OF_THE_BED * estimate_bed(case).solid_volume / case.floor_area  # as the bed height is defined
-        low, high = (solids / (1.0 - each) for each in (min(published), max(published)))
+        low, high = (solids / (1.0 - voidage) for voidage in (min(published), max(published)))
         verdict = f"published laws give {low:.3g} to {high:.3g} m"
     yield _mean("bed height", height, verdict, None)
 
@@ -210,13 +210,13 @@ def _particles(run: RunData) -> Iterator[KeyResult]:
     if not {"fed_count", "removed_count"} & history.keys():
         return
     count = history["particle_count"]
-    said = [f"{count[0]:.0f} at the start"]
+    sentences = [f"{count[0]:.0f} at the start"]
     if "fed_count" in history:
         waiting = history.get("waiting_count", np.zeros(1))[-1]
-        said.append(f"{since('fed_count'):.0f} fed" + f", {waiting:.0f} wait for a place" * bool(waiting))
+        sentences.append(f"{since('fed_count'):.0f} fed" + f", {waiting:.0f} wait for a place" * bool(waiting))
     if "removed_count" in history:
-        said.append(f"{since('removed_count'):.0f} removed, {since('removed_mass'):.3g} kg")
-    yield KeyResult("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(said), None)
+        sentences.append(f"{since('removed_count'):.0f} removed, {since('removed_mass'):.3g} kg")
+    yield KeyResult("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(sentences), None)
     if "residence_time" in history and math.isfinite(history["residence_time"][-1]):
         few, half, most = (float(history[f"residence_time_{share}"][-1]) for share in (10, 50, 90))
         spread = (

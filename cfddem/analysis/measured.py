@@ -70,15 +70,15 @@ class MeasuredComparison:
         size = math.sqrt(float(np.mean(points.value[self.inside] ** 2))) if count else math.nan
         rms = math.sqrt(float(np.mean(off**2))) if count else math.nan
         chi2 = float(np.mean((off / self.error[self.inside]) ** 2)) if count else math.nan
-        known = math.isfinite(chi2)
-        holds = bool(chi2 <= largest_chi2(count)) if known else None
-        found = {
+        is_finite = math.isfinite(chi2)
+        holds = bool(chi2 <= largest_chi2(count)) if is_finite else None
+        scores = {
             "name": points.name, "quantity": points.quantity, "unit": points.unit, "against": points.against or "mean",
             "points": count, "outside": len(points.value) - count, "bias": float(off.mean()) if count else math.nan,
             "rms": rms, "relative_rms": rms / size if size else math.nan, "chi2": chi2,
-            "errors": math.sqrt(chi2) if known else math.nan, "holds": holds,
+            "errors": math.sqrt(chi2) if is_finite else math.nan, "holds": holds,
         }  # fmt: skip
-        return found | {"verdict": _verdict(found)}
+        return scores | {"verdict": _verdict(scores)}
 
 
 def largest_chi2(count: int) -> float:
@@ -122,8 +122,8 @@ def compared_at(run: RunData, case: Case, points: Points, begin: float) -> Measu
     if points.against == "height":
         return _profile(run, case, points, begin)
     if points.quantity not in run.history:
-        known = [name for name in run.history if name not in ("time", "step")]
-        raise unknown_quantity(points.name, points.quantity, known)
+        names = [name for name in run.history if name not in ("time", "step")]
+        raise unknown_quantity(points.name, points.quantity, names)
     require_unit(points, run.unit(points.quantity))
     time, values = run.history["time"], run.history[points.quantity]
     usable = np.isfinite(values)

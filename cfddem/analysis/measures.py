@@ -105,9 +105,9 @@ def profile(field: Array, along: str = "z", open_cells: Mask | None = None, weig
     >>> profile(np.arange(8.0).reshape(2, 2, 2)).tolist()
     [1.5, 5.5]
     """
-    for name, given in (("open_cells", open_cells), ("weight", weight)):
-        if given is not None and given.shape != field.shape[:3]:
-            raise InputError(f"{name}.shape", given.shape, f"that of the field, {field.shape[:3]}")
+    for name, shares in (("open_cells", open_cells), ("weight", weight)):
+        if shares is not None and shares.shape != field.shape[:3]:
+            raise InputError(f"{name}.shape", shares.shape, f"that of the field, {field.shape[:3]}")
     share = np.ones(field.shape[:3]) if weight is None else np.asarray(weight, float)
     if open_cells is not None:
         share = np.where(open_cells, share, 0.0)

@@ -56,12 +56,12 @@ def profiles_of(run: RunData, case: Case, begin: float) -> Profiles | None:
 
 
 def _of_particles(
-    run: RunData, chosen: list[int], grid: Grid, held: np.ndarray
+    run: RunData, chosen: list[int], grid: Grid, open_shares: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Upward and downward flux, and granular temperature, of the layers."""
     layers, spacing = grid.shape[0], grid.spacing
     edges = np.asarray(grid.origin[2] + np.arange(layers + 1) * spacing[2], np.float64)
-    area = float(held[0].sum()) * spacing[0] * spacing[1]
+    area = float(open_shares[0].sum()) * spacing[0] * spacing[1]
     upward, downward, energy, freedoms = np.zeros((4, layers))
     for place in chosen:
         particles = run.particles(place)
@@ -70,8 +70,8 @@ def _of_particles(
         upward += flux.up / len(chosen)
         downward += flux.down / len(chosen)
         cells = cells_of(particles["position"], grid.shape, spacing, grid.origin)
-        found = granular_temperature(particles["velocity"], cells)
-        energy += (np.nan_to_num(found.cells) * found.freedoms).sum(axis=(1, 2))
-        freedoms += found.freedoms.sum(axis=(1, 2))
+        temperature = granular_temperature(particles["velocity"], cells)
+        energy += (np.nan_to_num(temperature.cells) * temperature.freedoms).sum(axis=(1, 2))
+        freedoms += temperature.freedoms.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
         return upward, downward, energy / freedoms

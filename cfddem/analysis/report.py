@@ -44,7 +44,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
     run = open_run(folder)
     if not len(run.history.get("time", ())):
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
-    case = with_files(case_of(run), [Path(each) for each in data])
+    case = with_files(case_of(run), [Path(path) for path in data])
     begin, end = window_of(run, case)
     measures = _measures(run, begin, inlet_changes(case, begin, end))
     drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
@@ -62,7 +62,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         surface=case.surface_in_words,
         key_results=key_results(run, case, measures, laws, STATE in actions),
         measures=measures,
-        measured=[each.score() for each in compared_with_measured(run, case, begin)],
+        measured=[compared.score() for compared in compared_with_measured(run, case, begin)],
         laws=laws,
         laws_note=expansion_note(case, laws, measures),
         ledger=_ledger(run),
@@ -71,7 +71,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         collisions=_collisions(run, begin),
         impacts=_impacts(run, begin, end),
         film_solution=_film_solution(run, begin),
-        warnings=[each for action, group in actions.items() for each in group if action != NOTE],
+        warnings=[entry for action, group in actions.items() for entry in group if action != NOTE],
         actions=actions,
         wall_time=run.about.get("wall_time", {}),
         steps={"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
@@ -106,7 +106,7 @@ def _start_of_means(case: Case, first: float, end: float) -> float:
     """Middle of a run, or of the time for which its inlet holds its last velocity [s]."""
     times, velocities = pairs_of(case.bed.inlet_velocity).T
     last = at_times(case.bed.inlet_velocity, end)
-    changing = [time for time, each in zip(times, velocities) if time < end and each != last]
+    changing = [time for time, velocity in zip(times, velocities) if time < end and velocity != last]
     begins = [time for time in times if time < end and time > max(changing, default=-math.inf)]
     return 0.5 * (max(begins[0], first) + end) if begins else 0.5 * (first + end)
 
@@ -145,10 +145,10 @@ def _measures(run: RunData, begin: float, changes: str) -> dict[str, Measure]:
     inside, measures = run.history["time"] >= begin, dict[str, Measure]()
     for name in _in_group(run, "measure"):
         column, quantity = run.history[name][inside], run.quantity(name)
-        known = np.isfinite(column)
-        if known.sum() <= 0.5 * len(column):
+        finite = np.isfinite(column)
+        if finite.sum() <= 0.5 * len(column):
             continue
-        values, time = column[known], run.history["time"][inside][known]
+        values, time = column[finite], run.history["time"][inside][finite]
         average, (drift, drift_error) = block_average(values), drift_of(time, values)
         steady = stationarity(values).stationary or abs(drift) <= NO_DRIFT * abs(average.mean)
         start_up = abs(drift) > max(3.0 * drift_error, DRIFTING * abs(average.mean))
@@ -199,14 +199,14 @@ def _energy_lines(run: RunData, energy: dict[str, float]) -> list[EnergyLine]:
 
 def _collisions(run: RunData, begin: float) -> dict[str, float]:
     """Summary of the collisions in the window; empty if none with films were recorded."""
-    found = recorded_regimes(run, begin)
-    if found is None:
+    regimes = recorded_regimes(run, begin)
+    if regimes is None:
         return {}
     return {
-        "number": found.collisions,
-        "median_stokes": found.median_stokes,
-        "contact_fraction": found.contact_fraction,
-        "deformed_fraction": found.deformed_fraction,
+        "number": regimes.collisions,
+        "median_stokes": regimes.median_stokes,
+        "contact_fraction": regimes.contact_fraction,
+        "deformed_fraction": regimes.deformed_fraction,
     }
 
 
@@ -214,8 +214,8 @@ def _impacts(run: RunData, begin: float, end: float) -> dict[str, float]:
     """Rate [1/s] and mean speed [m/s] of the collisions between particles in the window; empty if not recorded."""
     if "weight" not in run.collisions or not end > begin:
         return {}
-    found = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
-    return {"rate": found.rate, "contact_rate": found.contact_rate, "mean_speed": found.mean_speed}
+    statistics = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
+    return {"rate": statistics.rate, "contact_rate": statistics.contact_rate, "mean_speed": statistics.mean_speed}
 
 
 def _film_solution(run: RunData, begin: float) -> dict[str, float]:
@@ -229,8 +229,8 @@ def _film_solution(run: RunData, begin: float) -> dict[str, float]:
         return {}  # a run without films, or a history that lacks a column
     if not steps[inside][-1] > steps[inside][0]:
         return {}
-    made = (iterations[inside][-1] - iterations[inside][0]) / (steps[inside][-1] - steps[inside][0])
-    return {"iterations": float(made), "damping_number": float(np.nanmax(damping[inside]))}
+    per_step = (iterations[inside][-1] - iterations[inside][0]) / (steps[inside][-1] - steps[inside][0])
+    return {"iterations": float(per_step), "damping_number": float(np.nanmax(damping[inside]))}
 
 
 # ---------------------------------------------------------------- laws that a case uses, with their sources
@@ -255,18 +255,18 @@ BRIDGE = (
 def references_of(case: Case) -> list[Citation]:
     """Kind, name and reference of each law of a case."""
     load_built_in_laws()
-    found = [Citation(law.kind.replace("_", " "), law.name, law.reference) for law in _used(case)]
+    citations = [Citation(law.kind.replace("_", " "), law.name, law.reference) for law in _used(case)]
     if not case.bed.fixed and case.particle_count > 1 and "contact" not in case.laws.missing:
         contact = case.laws.contact_law
-        found.append(Citation("contact law", contact.name, contact.reference))
-    return [each for place, each in enumerate(found) if each not in found[:place]]
+        citations.append(Citation("contact law", contact.name, contact.reference))
+    return [citation for place, citation in enumerate(citations) if citation not in citations[:place]]
 
 
 def _used(case: Case) -> Iterator[Law]:
     laws = case.laws
     if case.has_fluid:
-        given = (laws.drag_law, laws.added_mass_law, case.agitation)
-        yield from (law for law in given if isinstance(law, Law))
+        choices = (laws.drag_law, laws.added_mass_law, case.agitation)
+        yield from (law for law in choices if isinstance(law, Law))
         yield from (REGISTRY["history"][name] for name in (laws.history,) if name in REGISTRY["history"])
         yield from (REGISTRY["lift"][name] for name in ("saffman_mei", "magnus") if laws.lift)
         yield from (REGISTRY["lift"][name] for name in ("torque",) if laws.torque)

@@ -81,7 +81,7 @@ class Report:
 
     def _repr_html_(self) -> str:
         """The key results, in a notebook."""
-        rows = [(each.name, with_error(each), each.verdict) for each in self.key_results]
+        rows = [(key_result.name, with_error(key_result), key_result.verdict) for key_result in self.key_results]
         return html.table(f"{self.case}: {self.status}; {window(self)}", rows)
 
     def summary(self) -> dict[str, Any]:
@@ -92,7 +92,7 @@ class Report:
 def lines(result: Report) -> list[str]:
     """The report as text, at most 100 columns wide."""
     energy = [(group, name, f"{joule} J", f"{share} %") for group, name, joule, share in energy_cells(result)]
-    shown = {each.name for each in result.key_results}
+    shown = {key_result.name for key_result in result.key_results}
     others = [
         (name, mean, steady + REMARKS.get(key, ""))
         for key, (name, mean, steady) in zip(result.measures, mean_cells(result))
@@ -102,7 +102,7 @@ def lines(result: Report) -> list[str]:
         _headline(result),
         _key_results(result.key_results),
         _measured(result.measured),
-        *(_action(*each) for each in result.actions.items()),
+        *(_action(*action_and_reasons) for action_and_reasons in result.actions.items()),
         ["  all other means", *table(others, widths=(28, 28), indent=2)],
         _laws(result),
         [
@@ -124,7 +124,7 @@ def lines(result: Report) -> list[str]:
 
 def mean_cells(result: Report) -> list[tuple[str, str, str]]:
     """Name, mean with error, and steadiness of every measure."""
-    return [(spelled(name), with_error(each), steadiness(each)) for name, each in result.measures.items()]
+    return [(spelled(name), with_error(measure), steadiness(measure)) for name, measure in result.measures.items()]
 
 
 def law_cells(result: Report) -> list[tuple[str, ...]]:
@@ -188,13 +188,13 @@ def with_error(row: KeyResult | Measure) -> str:
 def window(result: Report) -> str:
     """The averaging window, the lubrication films and the surface of the bed of a run in words."""
     begin, end = result.window
-    said = (("lubrication films", result.films), ("surface of the bed", result.surface))
-    return "; ".join([f"means from {begin:g} to {end:g} s", *(f"{name}: {words}" for name, words in said if words)])
+    notes = (("lubrication films", result.films), ("surface of the bed", result.surface))
+    return "; ".join([f"means from {begin:g} to {end:g} s", *(f"{name}: {words}" for name, words in notes if words)])
 
 
 def bounds_note(result: Report) -> list[str]:
     """What "at least" means, if a key result says it."""
-    bounds = (each.error_is_lower_bound and not math.isnan(each.error) for each in result.key_results)
+    bounds = (key_result.error_is_lower_bound and not math.isnan(key_result.error) for key_result in result.key_results)
     return [LOWER_BOUND] * any(bounds)
 
 
@@ -205,24 +205,24 @@ def _headline(result: Report) -> Iterator[str]:
     yield from bounds_note(result)
 
 
-def _key_results(found: Sequence[KeyResult]) -> Iterator[str]:
-    wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each.value, str)), 0)
-    for each in found:
-        opening = f"  {each.name:<16} {with_error(each):<{wide}} "
-        if isinstance(each.value, str) and len(opening) > wide + 20:
+def _key_results(results: Sequence[KeyResult]) -> Iterator[str]:
+    wide = max(26, *(len(with_error(key_result)) for key_result in results if not isinstance(key_result.value, str)), 0)
+    for key_result in results:
+        opening = f"  {key_result.name:<16} {with_error(key_result):<{wide}} "
+        if isinstance(key_result.value, str) and len(opening) > wide + 20:
             yield opening.rstrip()
             opening = " " * (wide + 20)
-        yield from textwrap.wrap(opening + each.verdict, WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
+        yield from textwrap.wrap(opening + key_result.verdict, WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
 
 
-def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
-    if found:
+def _measured(comparisons: list[dict[str, Any]]) -> Iterator[str]:
+    if comparisons:
         yield "  comparison with measured data"
-    for each in found:
-        points, outside = each["points"], each["outside"]
+    for comparison in comparisons:
+        points, outside = comparison["points"], comparison["outside"]
         part = f"{points} of {points + outside} points" if outside else f"{points} point{'' if points == 1 else 's'}"
-        opening = f"  {each['name']:<16} {part} of {spelled(each['quantity'])}: "
-        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 19)
+        opening = f"  {comparison['name']:<16} {part} of {spelled(comparison['quantity'])}: "
+        yield from textwrap.wrap(opening + comparison["verdict"], WIDTH, subsequent_indent=" " * 19)
 
 
 def _laws(result: Report) -> Iterator[str]:
@@ -233,27 +233,27 @@ def _laws(result: Report) -> Iterator[str]:
 
 
 def _collisions(result: Report) -> Iterator[str]:
-    if found := result.collisions:
+    if regimes := result.collisions:
         yield (
-            f"  {found['number']:.0f} collisions with films: median St {found['median_stokes']:.3g}; solid contact in "
-            f"{100.0 * found['contact_fraction']:.3g} %, deformed by the film in "
-            f"{100.0 * found['deformed_fraction']:.3g} %"
+            f"  {regimes['number']:.0f} collisions with films: median St {regimes['median_stokes']:.3g}; "
+            f"solid contact in {100.0 * regimes['contact_fraction']:.3g} %, deformed by the film in "
+            f"{100.0 * regimes['deformed_fraction']:.3g} %"
         )
-    if found and result.impacts:
+    if regimes and result.impacts:
         yield ""
-    if found := result.impacts:
-        touching = f"{found['contact_rate']:.3g} of them with solid contact"
-        yield f"  {found['rate']:.3g} collisions of a particle per second, {touching}"
-        yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
+    if impacts := result.impacts:
+        touching = f"{impacts['contact_rate']:.3g} of them with solid contact"
+        yield f"  {impacts['rate']:.3g} collisions of a particle per second, {touching}"
+        yield f"  mean speed of approach {impacts['mean_speed']:.3g} m/s"
 
 
-def film_solution(found: dict[str, float]) -> str:
+def film_solution(solution: dict[str, float]) -> str:
     """How films were solved together, in words; empty if none were."""
-    if not found:
+    if not solution:
         return ""
     return (
-        f"films solved together: {found['iterations']:.3g} iterations a step, largest damping number X = "
-        f"{found['damping_number']:.3g}"
+        f"films solved together: {solution['iterations']:.3g} iterations a step, largest damping number X = "
+        f"{solution['damping_number']:.3g}"
     )
 
 
@@ -261,17 +261,17 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     total = sum(seconds.values())
     if not total:
         return []
-    parts = sorted(seconds.items(), key=lambda each: -each[1])
-    shares = ", ".join(f"{name} {100 * each / total:.0f}{NO_BREAK}%" for name, each in parts[:6])
+    parts = sorted(seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1])
+    shares = ", ".join(f"{name} {100 * part_seconds / total:.0f}{NO_BREAK}%" for name, part_seconds in parts[:6])
     lines = textwrap.wrap(f"  wall time {total:.3g} s: {shares}", WIDTH, subsequent_indent="    ")
     return [line.replace(NO_BREAK, " ") for line in lines]
 
 
-def _action(action: str, found: Sequence[str]) -> Iterator[str]:
+def _action(action: str, reasons: Sequence[str]) -> Iterator[str]:
     yield f"  {action}"
     opening = "" if action == NOTE else "warning: "
-    for each in found:
-        yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+    for reason in reasons:
+        yield from textwrap.wrap(f"{opening}{reason}", WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 # ---------------------------------------------------------------- Markdown
@@ -284,12 +284,15 @@ def markdown(result: Report, figures: Mapping[str, str] | None = None) -> str:
     """
     law_headings = ("law", "run", "law", "run / law", "unit")
     actions = (
-        (f"**{action[0].upper()}{action[1:]}**", "\n".join(f"- {_escaped(each)}" for each in found))
-        for action, found in result.actions.items()
+        (f"**{action[0].upper()}{action[1:]}**", "\n".join(f"- {_escaped(reason)}" for reason in reasons))
+        for action, reasons in result.actions.items()
     )
-    key_results = ((f"**{each.name}**", with_error(each), each.verdict) for each in result.key_results)
+    key_results = (
+        (f"**{key_result.name}**", with_error(key_result), key_result.verdict) for key_result in result.key_results
+    )
     measured = [
-        (each["name"], f"{each['points']} of {spelled(each['quantity'])}", each["verdict"]) for each in result.measured
+        (comparison["name"], f"{comparison['points']} of {spelled(comparison['quantity'])}", comparison["verdict"])
+        for comparison in result.measured
     ]
     parts = [
         f"# {_escaped(result.case)}",

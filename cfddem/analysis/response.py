@@ -88,20 +88,18 @@ def response(shares: Array, computed: Array, measured: Array, error: Array, weig
     def values(point: Array) -> Array:
         return np.asarray((_basis((point - centre)[None], order) @ coefficients)[0])
 
-    found = least_squares(
-        lambda point: (values(point) - measured) / spread, centre.clip(1e-6, 1.0 - 1e-6), bounds=(0, 1)
-    )
-    slope = found.jac * spread[:, None]
+    fit = least_squares(lambda point: (values(point) - measured) / spread, centre.clip(1e-6, 1.0 - 1e-6), bounds=(0, 1))
+    slope = fit.jac * spread[:, None]
     degrees = max(len(measured) - parameters, 1)
-    chi2 = float((found.fun**2).sum()) / degrees
+    chi2 = float((fit.fun**2).sum()) / degrees
     gain = np.linalg.pinv((nearness[:, None] * basis).T @ basis) @ (nearness[:, None] * basis).T
-    leverage = float(((_basis((found.x - centre)[None], order)[0] @ gain) ** 2).sum())
-    chance = float((scatter**2 / spread**2).sum()) * _gram(_slopes(found.x - centre, order) @ gain)
+    leverage = float(((_basis((fit.x - centre)[None], order)[0] @ gain) ** 2).sum())
+    chance = float((scatter**2 / spread**2).sum()) * _gram(_slopes(fit.x - centre, order) @ gain)
     noise = np.diag(error**2) + (1.0 + leverage) * covariance
     matrix = _covariance(slope, spread, chance, noise, max(1.0, chi2))
     deviation = np.sqrt(np.diag(matrix))
     correlation = matrix / np.outer(deviation, deviation)
-    return Response(found.x, np.minimum(deviation, FLAT), correlation, chi2, scatter, values(found.x), order)
+    return Response(fit.x, np.minimum(deviation, FLAT), correlation, chi2, scatter, values(fit.x), order)
 
 
 def _covariance(slope: Array, spread: Array, chance: Array, noise: Array, factor: float) -> Array:

@@ -67,9 +67,9 @@ def warnings_of(
         *_series_warnings(case, measures),
         *_missing_laws(case),
         *(
-            (NOTE if each.severity == "note" else CASE, str(each))
-            for each in issues
-            if each.in_report and not case.laws.missing
+            (NOTE if issue.severity == "note" else CASE, str(issue))
+            for issue in issues
+            if issue.in_report and not case.laws.missing
         ),
         *_range_warnings(run, case),
         *((COMPARE, f"{row.law}: {row.outside_range}") for row in laws if row.outside_range),
@@ -82,9 +82,9 @@ def warnings_of(
 
 def _defluidised(run: RunData, case: Case) -> Found:
     """A wet bed that has come to rest, or lets the gas pass, at a velocity that fluidises the dry bed."""
-    found = defluidisation_of(run, case)
-    if found is not None:
-        yield STATE, str(found)
+    defluidised = defluidisation_of(run, case)
+    if defluidised is not None:
+        yield STATE, str(defluidised)
 
 
 def _spray_missed(run: RunData, case: Case) -> Found:
@@ -156,10 +156,10 @@ def _effect(case: Case) -> str:
         bed = estimate_bed(case)
         if not law_ranges.outside(law, law_ranges.state_of(case, bed)):
             return INSIDE.format(law.name)
-        found = law_ranges.effect_of_drag(case, law, bed)
+        effect = law_ranges.effect_of_drag(case, law, bed)
     except (ArithmeticError, ValueError):  # values beyond all correlations
         return ""
-    return f"; {found}" if found else ""
+    return f"; {effect}" if effect else ""
 
 
 def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = 0.0, effect: str = "") -> Found:
@@ -167,14 +167,16 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
     if evaluations and outside > share * evaluations:
         part = outside / evaluations
         uses = f"{percent(part)} of its uses" if part < ALL else "all of its uses"
-        what = f"was evaluated outside of its range in {uses} ({outside} times): {law.range_in_words}{effect}; {REMEDY}"
-        yield LAWS, f"the {kind} {law.name} {what}"
+        warning = (
+            f"was evaluated outside of its range in {uses} ({outside} times): {law.range_in_words}{effect}; {REMEDY}"
+        )
+        yield LAWS, f"the {kind} {law.name} {warning}"
 
 
 def _series_warnings(case: Case, measures: Mapping[str, Measure]) -> Found:
     """Series without a stationary mean, or without an error."""
     left_out = ("bed_height",) if case.is_one_sphere else ()  # a sphere that falls is no bed
-    unsteady = [name for name, each in measures.items() if each.stationary is False and name not in left_out]
+    unsteady = [name for name, measure in measures.items() if measure.stationary is False and name not in left_out]
     drifting = [name.replace("_", " ") for name in unsteady]
     if drifting:
         changes = next(iter(measures.values())).inlet_changes
@@ -182,5 +184,5 @@ def _series_warnings(case: Case, measures: Mapping[str, Measure]) -> Found:
         if changes:
             remedy = f"{changes}: set run.average_from to the start of its last value, or compare with data by velocity"
         yield LONGER, f"not stationary in the averaging window: {', '.join(drifting)}; {remedy}"
-    if any(each.stationary is None for each in measures.values()):
+    if any(measure.stationary is None for measure in measures.values()):
         yield LONGER, "the averaging window has too few rows for errors; run longer, or decrease run.history_every"

@@ -65,10 +65,10 @@ def layer_map(run: RunData, case: Case, layer: float | None = None) -> LayerMap:
     return LayerMap(run.times, 0.5 * (edges[1:] + edges[:-1]), np.array(rows))
 
 
-def waves(found: LayerMap, low: float, high: float, begin: float = -math.inf) -> Waves:
+def waves(layers: LayerMap, low: float, high: float, begin: float = -math.inf) -> Waves:
     """Wavelength, speed, amplitude and growth of the strongest wave in part of a map.
 
-    found      evenly spaced in time
+    layers     evenly spaced in time
     low, high  heights between which waves are sought, inside the bed [m]
     begin      first time [s]
     returns    Waves; NaN where the map is too short or too flat to tell
@@ -78,8 +78,8 @@ def waves(found: LayerMap, low: float, high: float, begin: float = -math.inf) ->
     """
     if not low < high:
         raise InputError("low", low, f"below high, {high:g} m")
-    inside, late = (found.height >= low) & (found.height <= high), found.time >= begin
-    height, time, field = found.height[inside], found.time[late], found.solid_fraction[np.ix_(late, inside)]
+    inside, late = (layers.height >= low) & (layers.height <= high), layers.time >= begin
+    height, time, field = layers.height[inside], layers.time[late], layers.solid_fraction[np.ix_(late, inside)]
     nan = math.nan
     if len(height) < FEWEST_LAYERS or len(time) < FEWEST_TIMES:
         return Waves(nan, nan, nan, nan, nan)
