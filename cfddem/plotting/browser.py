@@ -161,10 +161,10 @@ class Viewer:
     def _begin(self, run: RunData) -> None:
         """The first snapshot: which colours and layers there are; the page is built."""
         self.scene = Scene(run, off_screen=True)
-        known = colours.choices(run)
-        if self.state.colour not in known:
+        choices = colours.choices(run)
+        if self.state.colour not in choices:
             colours.values(run, -1, self.state.colour)  # raises the error that names the nearest
-        self.state.colours, self.state.layers = [*known, NOTHING], [*self.scene.layers, NOTHING]
+        self.state.colours, self.state.layers = [*choices, NOTHING], [*self.scene.layers, NOTHING]
         self.state.layer = self.state.layers[0]
         self._page, self.view = layout(self)
 
@@ -188,10 +188,10 @@ class Viewer:
             self.view.update()
 
     def _find_columns(self) -> None:
-        known = [name for name in self.run.history if name not in ("time", "step")]
-        if known and not self.state.known_columns:
-            self.state.columns = usual_columns(known)
-        self.state.known_columns = known
+        columns = [name for name in self.run.history if name not in ("time", "step")]
+        if columns and not self.state.known_columns:
+            self.state.columns = usual_columns(columns)
+        self.state.known_columns = columns
 
     def _draw_history(self, **_: Any) -> None:
         self._strip = strip(self.run, self.state.columns)
@@ -360,9 +360,9 @@ class Strip:
         return self.left + min(max(part, 0.0), 1.0) * (self.right - self.left)
 
 
-def usual_columns(known: Sequence[str]) -> list[str]:
+def usual_columns(columns: Sequence[str]) -> list[str]:
     """The columns that are shown at first."""
-    return [name for name in USUAL if name in known][:_USED] or list(known[:_USED])
+    return [name for name in USUAL if name in columns][:_USED] or list(columns[:_USED])
 
 
 def strip(run: RunData, columns: Sequence[str]) -> Strip | None:
@@ -372,15 +372,15 @@ def strip(run: RunData, columns: Sequence[str]) -> Strip | None:
         return None
     time = run.history["time"]
     figure, axes = blank(len(names), 1, width=_WIDTH, height=_AROUND + _PANEL * len(names), sharex=True)
-    for name, each in zip(names, axes):
-        each.plot(time, run.history[name], color=BLUE, linewidth=1.3)
-        each.set_title(f"{name.replace('_', ' ')}  [{shown_unit(run.unit(name))}]", loc="left", fontsize=10)
-        each.tick_params(labelsize=9)
-        each.locator_params(axis="y", nbins=4)
+    for name, panel in zip(names, axes):
+        panel.plot(time, run.history[name], color=BLUE, linewidth=1.3)
+        panel.set_title(f"{name.replace('_', ' ')}  [{shown_unit(run.unit(name))}]", loc="left", fontsize=10)
+        panel.tick_params(labelsize=9)
+        panel.locator_params(axis="y", nbins=4)
     first, last = float(time[0]), float(time[-1])
     axes[-1].set_xlim(first, last if last > first else first + 1.0)
     axes[-1].set_xlabel("time  [s]", fontsize=10)
     image = "data:image/png;base64," + encoded(figure, 200)  # lays the figure out, too
-    boxes = [each.get_position() for each in axes]
+    boxes = [panel.get_position() for panel in axes]
     begin, end = axes[-1].get_xlim()
     return Strip(image, boxes[0].x0, boxes[0].x1, 1.0 - boxes[0].y1, 1.0 - boxes[-1].y0, begin, end)

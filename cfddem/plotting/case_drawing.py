@@ -144,12 +144,12 @@ def _solid_fraction(case: Case) -> float:
 def _lattice(corner: tuple[float, float], size: tuple[float, float], diameter: float) -> np.ndarray:
     """Centres of a hexagonal arrangement in a rectangle (n, 2) [m]."""
     rows = max(int((size[1] - diameter) / (0.87 * diameter)) + 1, 1)
-    found = []
+    places = []
     for row in range(rows):
         first = 0.5 * diameter * (1 + row % 2)
         x = corner[0] + np.arange(first, size[0] - 0.49 * diameter, diameter)
-        found.append(np.stack([x, np.full(len(x), corner[1] + (0.5 + 0.87 * row) * diameter)], axis=1))
-    return np.concatenate(found)
+        places.append(np.stack([x, np.full(len(x), corner[1] + (0.5 + 0.87 * row) * diameter)], axis=1))
+    return np.concatenate(places)
 
 
 def _inflow(axes: Axes, case: Case) -> None:
@@ -247,8 +247,8 @@ def _surface(axes: Axes, wall: CaseWall) -> None:
         corners = triangles(wall)[:MOST_TRIANGLES, :, ::2]
     except CfddemError:
         return
-    for each in corners:
-        axes.fill(*each.T, facecolor=GREY, alpha=0.15, edgecolor=GREY, linewidth=0.3)
+    for triangle in corners:
+        axes.fill(*triangle.T, facecolor=GREY, alpha=0.15, edgecolor=GREY, linewidth=0.3)
 
 
 def _round(axes: Axes, wall: CaseWall, far: float) -> None:

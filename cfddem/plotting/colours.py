@@ -43,13 +43,13 @@ _PLACES = ("id", "position")
 
 def choices(run: RunData) -> list[str]:
     """Quantities of a run that can colour its spheres, the most useful first."""
-    known = set(run.particle_fields)
-    found = [SPECIES] if SPECIES in known else []
-    found += [SPEED] if "velocity" in known else []
-    found += [name for name in ("liquid", AGGLOMERATE, TEMPERATURE) if name in known]
-    found += [MOISTURE] if known & set(LIQUIDS) else []
-    found += [COLLISIONS] if run.collisions_of(-1) else []
-    return found + sorted(known - {"velocity", *_PLACES, *found})
+    fields = set(run.particle_fields)
+    choices_of_run = [SPECIES] if SPECIES in fields else []
+    choices_of_run += [SPEED] if "velocity" in fields else []
+    choices_of_run += [name for name in ("liquid", AGGLOMERATE, TEMPERATURE) if name in fields]
+    choices_of_run += [MOISTURE] if fields & set(LIQUIDS) else []
+    choices_of_run += [COLLISIONS] if run.collisions_of(-1) else []
+    return choices_of_run + sorted(fields - {"velocity", *_PLACES, *choices_of_run})
 
 
 def usual(run: RunData) -> str:
@@ -74,23 +74,23 @@ def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarr
     if name not in particles:
         remedy = "run.record_collisions = true records the collisions" if name == COLLISIONS else ""
         raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]), remedy)
-    found = particles[name]
+    field = particles[name]
     if name == AGGLOMERATE:
-        return particles, scattered(found)
-    return particles, magnitude(found) if found.ndim == 2 else found.astype(float)
+        return particles, scattered(field)
+    return particles, magnitude(field) if field.ndim == 2 else field.astype(float)
 
 
-def limits(found: np.ndarray, colour: str) -> tuple[float, float]:
+def limits(numbers: np.ndarray, colour: str) -> tuple[float, float]:
     """Values of the first and the last colour; a few extreme values lie beyond."""
     if colour == AGGLOMERATE:
         return 0.0, 1.0
     if colour == SPECIES:
-        return 0.0, max(1.0, float(found.max(initial=0.0)))
-    high = float(np.quantile(found, 0.998)) if found.size else 1.0
-    if colour == TEMPERATURE and found.size:
-        low = float(np.quantile(found, 0.002))
+        return 0.0, max(1.0, float(numbers.max(initial=0.0)))
+    high = float(np.quantile(numbers, 0.998)) if numbers.size else 1.0
+    if colour == TEMPERATURE and numbers.size:
+        low = float(np.quantile(numbers, 0.002))
         return low, high if high - low > 1e-3 else low + 1.0
-    low = 0.0 if found.size == 0 or found.min() >= 0.0 else float(found.min())
+    low = 0.0 if numbers.size == 0 or numbers.min() >= 0.0 else float(numbers.min())
     return low, high if high > low else low + 1.0
 
 
@@ -154,8 +154,8 @@ def _collision_counts(ids: np.ndarray, recorded: dict[str, np.ndarray]) -> np.nd
         return counts
     for end in ("first", "second"):
         place = np.minimum(np.searchsorted(ids, recorded[end]), len(ids) - 1)
-        found = ids[place] == recorded[end]
-        np.add.at(counts, place[found], recorded["weight"][found])
+        matches = ids[place] == recorded[end]
+        np.add.at(counts, place[matches], recorded["weight"][matches])
     return counts
 
 

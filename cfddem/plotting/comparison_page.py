@@ -35,7 +35,7 @@ def comparison_page(folders: Sequence[Path], output: Path, result: dict[str, Any
     """
     runs = [open_run(folder) for folder in folders]
     result = compare(folders) if result is None else result
-    names = [each["name"] for each in result["runs"]]
+    names = [run["name"] for run in result["runs"]]
     if output.suffix.lower() == ".png":
         save(histories(runs, names), output)
         return output
@@ -66,23 +66,25 @@ def histories(runs: Sequence[RunData], names: Sequence[str]) -> Any:
 
 def profiles(runs: Sequence[RunData], names: Sequence[str], result: dict[str, Any]) -> Any:
     """Voidage and granular temperature of all runs against height; None if a run has no profiles."""
-    found = []
-    for run, each in zip(runs, result["runs"]):
+    of_runs = []
+    for run, described in zip(runs, result["runs"]):
         try:
-            found.append(profiles_of(run, case_of(run), each["window"][0]))
+            of_runs.append(profiles_of(run, case_of(run), described["window"][0]))
         except RunFailed:
             return None
     kinds = [
-        kind for kind in ("voidage", "temperature") if all(getattr(each, kind, None) is not None for each in found)
+        kind
+        for kind in ("voidage", "temperature")
+        if all(getattr(profile, kind, None) is not None for profile in of_runs)
     ]
     if not kinds:
         return None
     titles = {"voidage": ("voidage", "-"), "temperature": ("granular temperature", "m2/s2")}
     figure, axes = blank(1, len(kinds), width=4.0 * len(kinds) + 0.4, height=4.2, sharey=True)
     for kind, panel in zip(kinds, axes):
-        for each, title, style in zip(found, names, line_styles(len(runs))):
-            assert each is not None
-            panel.plot(getattr(each, kind), each.height, label=title, **style)
+        for profile, title, style in zip(of_runs, names, line_styles(len(runs))):
+            assert profile is not None
+            panel.plot(getattr(profile, kind), profile.height, label=title, **style)
         label(panel, *titles[kind], "", "")
         panel.set_ylabel("")
         panel.locator_params(axis="x", nbins=5)
@@ -100,10 +102,10 @@ def _template() -> Any:
 
 
 def _key_results(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
-    def words(each: KeyResult | None) -> str:
-        return "-" if each is None else with_error(each)
+    def words(key_result: KeyResult | None) -> str:
+        return "-" if key_result is None else with_error(key_result)
 
-    return [(name, [words(each) for each in row]) for name, row in result["key_results"].items()]
+    return [(name, [words(key_result) for key_result in row]) for name, row in result["key_results"].items()]
 
 
 def _measures(result: dict[str, Any]) -> list[tuple[str, str, list[tuple[str, str, str]]]]:

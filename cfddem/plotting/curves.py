@@ -93,19 +93,19 @@ def history(folder: str | Path, output: str | Path | None = None, columns: Seque
     from cfddem.io.reading import open_run
 
     run = open_run(folder)
-    known = [name for name in run.history if name not in ("time", "step")]
-    if not known:
+    listed = [name for name in run.history if name not in ("time", "step")]
+    if not listed:
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
     for name in columns:
-        if name not in known:
-            raise InputError("columns", name, nearest(name, known))
-    usual = [name for name in ("bed_height", "pressure_drop") if name in known]
-    names = list(columns) or usual or known
+        if name not in listed:
+            raise InputError("columns", name, nearest(name, listed))
+    usual = [name for name in ("bed_height", "pressure_drop") if name in listed]
+    names = list(columns) or usual or listed
     figure, axes = blank(len(names), 1, width=8.0, height=0.7 + 2.1 * len(names), sharex=True)
-    for name, each in zip(names, axes):
-        each.plot(run.history["time"], run.history[name], color=BLUE)
-        label(each, "", "", name.replace("_", " "), shown_unit(run.unit(name)))
-        each.set_xlabel("")
+    for name, panel in zip(names, axes):
+        panel.plot(run.history["time"], run.history[name], color=BLUE)
+        label(panel, "", "", name.replace("_", " "), shown_unit(run.unit(name)))
+        panel.set_xlabel("")
     axes[-1].set_xlabel("time  [s]")
     figure.suptitle(run.folder.resolve().name, fontsize=12, fontweight="bold")
     output = Path(f"{run.folder.resolve().name}-history.png" if output is None else output)
@@ -125,32 +125,36 @@ def collisions(folder: str | Path, output: str | Path | None = None) -> Path:
     from cfddem.io.reading import open_run
 
     run = open_run(folder)
-    found = regime_map(run.collisions)
+    regimes = regime_map(run.collisions)
     figure, axes = panels(1, width=6.4, height=4.8)
-    draw_regimes(axes, found, run.folder.resolve().name)
+    draw_regimes(axes, regimes, run.folder.resolve().name)
     output = Path(f"{run.folder.resolve().name}-collisions.png" if output is None else output)
     save(figure, output)
     return output
 
 
-def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | None = None) -> Any:
+def draw_regimes(axes: Axes, regimes: RegimeMap, title: str = "", most: float | None = None) -> Any:
     """Density of collisions over Stokes number and h_eps/h_sigma; an orange line marks half of them in solid contact.
 
     most     density of the darkest colour; that of the map if not given
     returns  the coloured mesh, for a colour bar
     """
-    shown = np.where(found.density > 0.0, found.density, np.nan)
-    shades = axes.pcolormesh(found.stokes, found.gap_ratio, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True)
-    column = np.nansum(found.contact * found.density, axis=0) / np.maximum(np.nansum(found.density, axis=0), 1e-300)
+    shown = np.where(regimes.density > 0.0, regimes.density, np.nan)
+    shades = axes.pcolormesh(
+        regimes.stokes, regimes.gap_ratio, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True
+    )
+    column = np.nansum(regimes.contact * regimes.density, axis=0) / np.maximum(
+        np.nansum(regimes.density, axis=0), 1e-300
+    )
     crossed = np.flatnonzero((column[:-1] < 0.5) & (column[1:] >= 0.5))
     if len(crossed):
-        axes.axvline(float(found.stokes[crossed[0] + 1]), color=ORANGE, linewidth=1.2)
-    low, high = min(found.gap_ratio[0], 0.5), max(found.gap_ratio[-1], 2.0)
+        axes.axvline(float(regimes.stokes[crossed[0] + 1]), color=ORANGE, linewidth=1.2)
+    low, high = min(regimes.gap_ratio[0], 0.5), max(regimes.gap_ratio[-1], 2.0)
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
-    axes.set(xscale="log", yscale="log", xlim=(found.stokes[0], found.stokes[-1]), ylim=(low, high))
+    axes.set(xscale="log", yscale="log", xlim=(regimes.stokes[0], regimes.stokes[-1]), ylim=(low, high))
     label(axes, "Stokes number", "-", "elastohydrodynamic gap over roughness", "-", title)
     axes.text(
-        0.02, 0.98, f"median St {found.median_stokes:.3g}\nsolid contact in {100.0 * found.contact_fraction:.3g} %",
+        0.02, 0.98, f"median St {regimes.median_stokes:.3g}\nsolid contact in {100.0 * regimes.contact_fraction:.3g} %",
         transform=axes.transAxes, ha="left", va="top", fontsize=9.5,
     )  # fmt: skip
     return shades

@@ -101,7 +101,7 @@ def _require_ffmpeg() -> None:
 def _write_gif(path: Path, frames: Iterator[np.ndarray], frames_per_second: float) -> None:
     from PIL import Image
 
-    images = (Image.fromarray(each).quantize(256, kmeans=1) for each in frames)
+    images = (Image.fromarray(frame).quantize(256, kmeans=1) for frame in frames)
     first = next(images)
     first.save(path, save_all=True, append_images=images, duration=round(1000 / frames_per_second), loop=0)
 
@@ -111,8 +111,8 @@ def _write_mp4(path: Path, frames: Iterator[np.ndarray], frames_per_second: floa
 
     writer: Any = imageio.get_writer(path, fps=frames_per_second, macro_block_size=2, quality=8)
     with writer:
-        for each in frames:
-            writer.append_data(each)
+        for frame in frames:
+            writer.append_data(frame)
 
 
 # ---------------------------------------------------------------- panels
@@ -168,8 +168,10 @@ class Stage:
         errors     InputError for an unknown panel or field; RunFailed if this machine cannot render
         """
         colour = colour or colours.usual(run)
-        recorded = {"spheres": run.particle_fields, "voidage": "voidage" in run.fluid_fields}
-        recorded |= {each: each in run.fluid_fields for each in [BESIDE.get(colour, "")]}
+        beside = BESIDE.get(colour, "")
+        recorded = {
+            "spheres": run.particle_fields, "voidage": "voidage" in run.fluid_fields, beside: beside in run.fluid_fields
+        }  # fmt: skip
         panels = tuple(show) or tuple(name for name, there in recorded.items() if there)
         for name in panels:
             if name not in PANELS:
@@ -184,14 +186,14 @@ class Stage:
         limits: dict[str, tuple[float, float]] = {}
         deep = False
         if "spheres" in panels:
-            shown = [colours.values(run, each, colour) for each in snapshots]
+            shown = [colours.values(run, snapshot, colour) for snapshot in snapshots]
             limits["spheres"] = colours.limits(np.concatenate([values for _, values in shown]), colour)
-            largest = max((float(each["radius"].max(initial=0.0)) for each, _ in shown), default=0.0)
+            largest = max((float(particles["radius"].max(initial=0.0)) for particles, _ in shown), default=0.0)
             deep = size[depth] > 12.0 * largest
         for name in set(panels) & {"voidage", *SCALARS}:
-            limits[name] = limits_of_fluid(np.stack([run.fluid(name, each) for each in snapshots]), name)
+            limits[name] = limits_of_fluid(np.stack([run.fluid(name, snapshot) for snapshot in snapshots]), name)
         if "streamlines" in panels:
-            fastest = max(float(colours.magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
+            fastest = max(float(colours.magnitude(run.fluid("velocity", snapshot)).max()) for snapshot in snapshots)
             limits["streamlines"] = (0.0, fastest or 1.0)
         return cls(run, panels, bounds, depth, colour, deep if cut is None else cut, limits)
 
@@ -270,8 +272,8 @@ class Stage:
         view = rendering.View(self.bounds, self.depth, pixels)
         image = rendering.surfaces(view, {SKY: bubbles, "#e3e3e3": freeboard})
         axes.imshow(image, extent=self._extent, interpolation="antialiased")
-        found = "" if bubbles.n_points else ": none"
-        axes.set_title(f"bubbles{found}\nsurface of voidage {BUBBLE:g}", loc="left")
+        how_many = "" if bubbles.n_points else ": none"
+        axes.set_title(f"bubbles{how_many}\nsurface of voidage {BUBBLE:g}", loc="left")
 
     def _streamlines(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
         velocity, where = self._slice(self.run.fluid("velocity", snapshot))
@@ -393,8 +395,8 @@ def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
             high[2] = min(high[2], low[2] + max(HEADROOM * float(np.nanmax(heights)), float((high - low)[:2].max())))
         return np.stack([low, high], axis=1)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for each in snapshots:
-        particles = run.particles(each)
+    for snapshot in snapshots:
+        particles = run.particles(snapshot)
         if len(particles["position"]):
             reach = particles.get("radius", np.zeros(len(particles["position"])))[:, None]
             low = np.minimum(low, (particles["position"] - reach).min(axis=0))
@@ -426,5 +428,5 @@ def _bubbles(voidage: np.ndarray, grid: Any) -> tuple[Any, Any]:
     regions, faces = np.asarray(parts.point_data["RegionId"]), parts.regular_faces
     top = parts.points[:, 2] > image.bounds[5] - 0.01 * grid.spacing[2]
     above = np.isin(regions, np.unique(regions[top]))[faces[:, 0]]
-    closed, freeboard = (pyvista.PolyData.from_regular_faces(parts.points, faces[each]) for each in (~above, above))
+    closed, freeboard = (pyvista.PolyData.from_regular_faces(parts.points, faces[side]) for side in (~above, above))
     return closed.clean(), freeboard.clean()

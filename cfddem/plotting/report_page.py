@@ -112,7 +112,7 @@ def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
         provenance=_provenance(result.provenance),
         case_text=run.case_text,
         figures={name: (encoded(figure), caption) for name, (figure, caption) in figures},
-        **{each.__name__: each for each in (with_error, spelled, shown_unit, steadiness)},
+        **{function.__name__: function for function in (with_error, spelled, shown_unit, steadiness)},
     )
     return text
 
@@ -127,33 +127,35 @@ def _template() -> Any:
 # ---------------------------------------------------------------- tables
 
 
-def _preflight(made: dict[str, Any]) -> Rows:
+def _preflight(preflight: dict[str, Any]) -> Rows:
     return [
-        (group, name, "-" if each["value"] is None else f"{each['value']:.4g}", each["unit"], each["note"])
-        for group, numbers in made["numbers"].items()
-        for name, each in numbers.items()
+        (group, name, "-" if number["value"] is None else f"{number['value']:.4g}", number["unit"], number["note"])
+        for group, numbers in preflight["numbers"].items()
+        for name, number in numbers.items()
     ]
 
 
 def _wall_time(seconds: dict[str, float]) -> Rows:
     total = sum(seconds.values())
-    parts = sorted(seconds.items(), key=lambda each: -each[1])
-    shares: Rows = [(name, f"{each:.3g}", f"{100.0 * each / total:.1f} %") for name, each in parts if total]
+    parts = sorted(seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1])
+    shares: Rows = [
+        (name, f"{part_seconds:.3g}", f"{100.0 * part_seconds / total:.1f} %") for name, part_seconds in parts if total
+    ]
     return [*shares, ("all", f"{total:.3g}", "")]
 
 
 def _provenance(values: dict[str, Any]) -> Rows:
-    tables = {name: each if isinstance(each, dict) else {"": each} for name, each in values.items()}
+    tables = {name: content if isinstance(content, dict) else {"": content} for name, content in values.items()}
     return [
         (f"{name}: {key}".removesuffix(": "), _words(value))
-        for name, each in tables.items()
-        for key, value in each.items()
+        for name, table in tables.items()
+        for key, value in table.items()
     ]
 
 
 def _words(value: Any) -> str:
     if isinstance(value, dict):
-        return ", ".join(f"{name} {each}" for name, each in value.items() if each)
+        return ", ".join(f"{name} {item_value}" for name, item_value in value.items() if item_value)
     return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
@@ -174,7 +176,7 @@ def figures_of(run: RunData, case: Case, result: Report) -> Figures:
 
 def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, str]]:
     begin, end = result.window
-    means = {name: each.mean for name, each in result.measures.items()}
+    means = {name: measure.mean for name, measure in result.measures.items()}
     height = means.get("bed_height")
     if compared := compared_with_measured(run, case, begin):
         yield "measured", measured_figure(compared), "Measured points with their standard errors, and the run."
@@ -182,9 +184,11 @@ def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, s
         if (picture := _picture(run, colour)) is not None:
             yield name, picture, f"The last snapshot, at {run.times[-1]:.4g} s{about}."
     yield "series", _series(run, case, begin, end), "Grey: averaging window. Orange: means."
-    if (found := _profiles(run, case, begin)) is not None:
-        caption = f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: "
-        yield "profiles", _draw_profiles(found, height), f"{caption}bed height."
+    if (profiles := _profiles(run, case, begin)) is not None:
+        caption = (
+            f"Means over {profiles.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: "
+        )
+        yield "profiles", _draw_profiles(profiles, height), f"{caption}bed height."
     if (
         height is not None
         and is_liquid_bed(case)
@@ -258,13 +262,13 @@ def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
         if column in history:
             curves.append((named, history[column]))
     inside = history["time"] >= begin
-    curves = [each for each in curves if np.isfinite(each[1][inside]).any()]
+    curves = [curve for curve in curves if np.isfinite(curve[1][inside]).any()]
     figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.8 * len(curves), sharex=True)
-    for each, (name, values) in zip(axes, curves):
-        each.axvspan(begin, end, color="#f3f3f3", zorder=0)
-        each.plot(history["time"], values, color=BLUE)
-        each.hlines(np.nanmean(values[inside]), begin, end, color=ORANGE, linewidth=1.2)
-        each.set_ylabel(name)
+    for panel, (name, values) in zip(axes, curves):
+        panel.axvspan(begin, end, color="#f3f3f3", zorder=0)
+        panel.plot(history["time"], values, color=BLUE)
+        panel.hlines(np.nanmean(values[inside]), begin, end, color=ORANGE, linewidth=1.2)
+        panel.set_ylabel(name)
     axes[-1].set_xlabel("time  [s]")
     figure.align_ylabels()
     return figure
@@ -273,34 +277,34 @@ def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
 def _profiles(run: RunData, case: Case, begin: float) -> Profiles | None:
     """The profiles of a run; None if no snapshot in the window can be read, or none has a quantity to show."""
     try:
-        found = profiles_of(run, case, begin)
+        profiles = profiles_of(run, case, begin)
     except RunFailed:
         return None
-    return None if found is None or (found.voidage is None and found.upward is None) else found
+    return None if profiles is None or (profiles.voidage is None and profiles.upward is None) else profiles
 
 
-def _draw_profiles(found: Profiles, bed_height: float | None) -> Any:
+def _draw_profiles(profiles: Profiles, bed_height: float | None) -> Any:
     """Voidage, solids flux and granular temperature against height, as far as they are recorded."""
-    columns = (found.voidage is not None) + 2 * (found.upward is not None)
+    columns = (profiles.voidage is not None) + 2 * (profiles.upward is not None)
     figure, axes = blank(1, columns, width=2.8 * columns + 0.4, height=3.8, sharey=True)
     remaining = list(axes)
-    if found.voidage is not None and found.voidage_spread is not None:
+    if profiles.voidage is not None and profiles.voidage_spread is not None:
         panel = remaining.pop(0)
-        low, high = found.voidage - found.voidage_spread, found.voidage + found.voidage_spread
-        panel.fill_betweenx(found.height, low, high, color=SKY, alpha=0.4, linewidth=0)
-        panel.plot(found.voidage, found.height, color=BLUE)
+        low, high = profiles.voidage - profiles.voidage_spread, profiles.voidage + profiles.voidage_spread
+        panel.fill_betweenx(profiles.height, low, high, color=SKY, alpha=0.4, linewidth=0)
+        panel.plot(profiles.voidage, profiles.height, color=BLUE)
         label(panel, "voidage", "-", "", "")
-    if found.upward is not None and found.downward is not None and found.temperature is not None:
+    if profiles.upward is not None and profiles.downward is not None and profiles.temperature is not None:
         flux, temperature = remaining
-        flux.plot(found.upward, found.height, color=GREEN, label="up")
-        flux.plot(found.downward, found.height, color=ORANGE, label="down")
+        flux.plot(profiles.upward, profiles.height, color=GREEN, label="up")
+        flux.plot(profiles.downward, profiles.height, color=ORANGE, label="down")
         flux.legend(frameon=False, fontsize=9.5)
         label(flux, "solids flux", "m/s", "", "")
-        temperature.plot(found.temperature, found.height, color=BLUE)
+        temperature.plot(profiles.temperature, profiles.height, color=BLUE)
         label(temperature, "granular temperature", "m2/s2", "", "")
     for panel in axes:
         panel.set_ylabel("")
-        panel.set_ylim(0.0, float(found.height[-1] + found.height[0]))
+        panel.set_ylim(0.0, float(profiles.height[-1] + profiles.height[0]))
         panel.locator_params(axis="x", nbins=4)
         panel.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
         if bed_height is not None:
@@ -312,26 +316,26 @@ def _draw_profiles(found: Profiles, bed_height: float | None) -> Any:
 # ---------------------------------------------------------------- measured points
 
 
-def measured_figure(found: Sequence[MeasuredComparison]) -> Any:
+def measured_figure(comparisons: Sequence[MeasuredComparison]) -> Any:
     """One panel for each set of measured data: the run as a line, the points with error bars."""
-    figure, axes = blank(len(found), 1, width=8.0, height=0.5 + 3.0 * len(found))
-    for each, panel in zip(found, axes):
-        points, bars = each.points, np.where(np.isfinite(each.points.error), each.points.error, 0.0)
+    figure, axes = blank(len(comparisons), 1, width=8.0, height=0.5 + 3.0 * len(comparisons))
+    for comparison, panel in zip(comparisons, axes):
+        points, bars = comparison.points, np.where(np.isfinite(comparison.points.error), comparison.points.error, 0.0)
         name = points.quantity.replace("_", " ")
         style: dict[str, Any] = {"fmt": "o", "color": ORANGE, "markersize": 5.0, "capsize": 2.5, "zorder": 3}
         if points.against == "height":
-            panel.plot(each.line[1], each.line[0], color=BLUE, label="run")
+            panel.plot(comparison.line[1], comparison.line[0], color=BLUE, label="run")
             panel.errorbar(points.value, points.place, xerr=bars, label="measured", **style)
             label(panel, name, shown_unit(points.unit), "height", "m", points.name)
         elif points.against:
             marker = "o-" if points.against == "inlet_velocity" else "-"
-            panel.plot(*each.line, marker, color=BLUE, label="run")
+            panel.plot(*comparison.line, marker, color=BLUE, label="run")
             panel.errorbar(points.place, points.value, yerr=bars, label="measured", **style)
             axis = (points.against.replace("_", " "), ABSCISSAE[points.against])
             label(panel, *axis, name, shown_unit(points.unit), points.name)
         else:
-            place, mean = np.arange(len(points.value)) + 1.0, float(each.computed[0])
-            error = float(np.max(each.computed_error))
+            place, mean = np.arange(len(points.value)) + 1.0, float(comparison.computed[0])
+            error = float(np.max(comparison.computed_error))
             panel.axhspan(mean - error, mean + error, color=BLUE, alpha=0.2, linewidth=0)
             panel.axhline(mean, color=BLUE, label="run")
             panel.errorbar(place, points.value, yerr=bars, label="measured", **style)

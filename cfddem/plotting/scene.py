@@ -179,10 +179,10 @@ class Scene:
         """Values of the first and the last colour, alike for all snapshots."""
         if (side, name) not in self._limits:
             if side == SPHERES:
-                found = [colours.values(self.run, each, name)[1] for each in self._examined]
+                arrays = [colours.values(self.run, snapshot, name)[1] for snapshot in self._examined]
             else:
-                found = [self._fluid(name, each).ravel() for each in self._examined]
-            together = np.concatenate(found)
+                arrays = [self._fluid(name, snapshot).ravel() for snapshot in self._examined]
+            together = np.concatenate(arrays)
             together = together[np.isfinite(together)]
             of_fluid = side == FLUID and name != "speed" and together.size
             self._limits[side, name] = (limits_of_fluid if of_fluid else colours.limits)(together, name)
