@@ -91,9 +91,9 @@ def new(
     if schema:
         print(as_json(Case.model_json_schema(), indent=2))
     elif name is None:
-        titles = [(known, each.title) for known, each in gallery().items()]
+        titles = [(name, case.title) for name, case in gallery().items()]
         if json:
-            print_json("gallery", {"cases": [{"name": known, "title": title} for known, title in titles]})
+            print_json("gallery", {"cases": [{"name": name, "title": title} for name, title in titles]})
         else:
             print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
@@ -166,18 +166,18 @@ def stability(
     require_folder(plot)
     described = changes.case(find_case(case))
     with refused_extremes(described):
-        found = waves_of(described, estimate_bed(described))
-    if found is None:
+        waves = waves_of(described, estimate_bed(described))
+    if waves is None:
         remedy = "waves are computed for free particles above minimum fluidisation, denser than their liquid"
         raise InputError("case", described.title or None, "a fluidised liquid bed", remedy)
     if json:
-        print_json("stability", summary(found))
+        print_json("stability", summary(waves))
     else:
-        print("\n".join(lines(found)))
+        print("\n".join(lines(waves)))
     if plot is not None:
         from cfddem.plotting.study_figures import growth_curves
 
-        growth_curves(found, plot)
+        growth_curves(waves, plot)
         print(f"figure: {plot}", file=sys.stderr if json else sys.stdout)
 
 
@@ -341,10 +341,10 @@ def import_laws(file: Path) -> None:
     """
     if file.suffix != ".py" or not file.stem.isidentifier() or not file.is_file():
         raise InputError("--laws", str(file), "an existing Python file, such as my_laws.py")
-    known = sys.modules.get(file.stem)
-    if known is not None and getattr(known, "__file__", None) == str(file.resolve()):
+    loaded = sys.modules.get(file.stem)
+    if loaded is not None and getattr(loaded, "__file__", None) == str(file.resolve()):
         return
-    if known is not None or file.stem in sys.stdlib_module_names:
+    if loaded is not None or file.stem in sys.stdlib_module_names:
         raise InputError("--laws", str(file), "a file with a name of its own", "another module has its name; rename it")
     spec = spec_from_file_location(file.stem, file.resolve())
     assert spec is not None and spec.loader is not None

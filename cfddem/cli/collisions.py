@@ -28,33 +28,33 @@ def _collide(
     data: Path | None,
     figure: Path,
     csv: Path | None,
-    **given: Any,
+    **arguments: Any,
 ) -> immersed_pair.Collision | CollisionRange | MeasuredCollisions:
     """Collide two spheres of named materials: once, over a range of Stokes numbers, or at each measured point."""
-    known, spin = immersed_pair.MATERIALS, given.pop("spin")
-    own, other = given.pop("diameter"), given.pop("target_diameter")
+    materials, spin = immersed_pair.MATERIALS, arguments.pop("spin")
+    own, other = arguments.pop("diameter"), arguments.pop("target_diameter")
     diameters = own, own if other is None else other
     numbers = None if stokes is None else stokes_numbers(stokes)
     for name in (material, target):
-        if name is not None and name not in known:
-            raise InputError("material", name, nearest(name, known))
-    pair = known[material], known[target or material]
+        if name is not None and name not in materials:
+            raise InputError("material", name, nearest(name, materials))
+    pair = materials[material], materials[target or material]
     if roughness is not None:
-        rough = [Material(**each.model_dump() | {"roughness": roughness}) for each in pair]
+        rough = [Material(**material_of_sphere.model_dump() | {"roughness": roughness}) for material_of_sphere in pair]
         pair = rough[0], rough[1]
     if data is not None and csv is not None:
         raise InputError("--csv", str(csv), "left out with --data", "the points of a figure are those of the data")
     require_folder(csv)
 
     def once(**point: float) -> immersed_pair.Collision:
-        return immersed_pair.collide(pair, diameter=diameters, spin=(spin, 0.0), **given | point)
+        return immersed_pair.collide(pair, diameter=diameters, spin=(spin, 0.0), **arguments | point)
 
     if data is not None:
         return compare_points(data, once, figure)
-    found = [once(**({} if numbers is None else {"stokes": each})) for each in numbers or [0.0]]
+    collisions = [once(**({} if numbers is None else {"stokes": number})) for number in numbers or [0.0]]
     if csv is not None:
-        write_csv(found, csv)
-    return found[0] if len(found) == 1 else CollisionRange(found)
+        write_csv(collisions, csv)
+    return collisions[0] if len(collisions) == 1 else CollisionRange(collisions)
 
 
 SCHEMA_OF: dict[type, str] = {
@@ -67,8 +67,14 @@ def _show_collision(result: immersed_pair.Collision | CollisionRange | MeasuredC
         show(result.summary(), UNITS)
         return
     rows = [
-        (f"{each.stokes:.4g}", each.outcome, f"{each.restitution:.4f}", f"{each.minimum_gap:.4g} m", each.mechanism)
-        for each in result.collisions
+        (
+            f"{collision.stokes:.4g}",
+            collision.outcome,
+            f"{collision.restitution:.4f}",
+            f"{collision.minimum_gap:.4g} m",
+            collision.mechanism,
+        )
+        for collision in result.collisions
     ]
     print("\n".join(table(rows, ("stokes", "outcome", "restitution", "minimum gap", "mechanism"), gap=2)))
 
@@ -110,12 +116,12 @@ def _show_impact(result: wet_wall.Impact) -> None:
 impact = command(wet_wall.impact, "wet-wall", show_result=_show_impact)
 
 
-def _three_spheres(*, map: Path | None, **given: Any) -> three_spheres.Triplet:
+def _three_spheres(*, map: Path | None, **arguments: Any) -> three_spheres.Triplet:
     """Simulate three spheres, and draw the map of outcomes if asked for."""
     require_folder(map)
     if map is not None:
-        draw_map(map, given)
-    return three_spheres.simulate_three_spheres(**given)
+        draw_map(map, arguments)
+    return three_spheres.simulate_three_spheres(**arguments)
 
 
 def _show_triplet(result: three_spheres.Triplet) -> None:
@@ -144,13 +150,13 @@ collide_wet = command(
 )
 
 
-def _strike_film(*, figure: Path | None, movie: Path | None, **given: Any) -> film_impact.FilmImpact:
+def _strike_film(*, figure: Path | None, movie: Path | None, **arguments: Any) -> film_impact.FilmImpact:
     """Let the bead fall, and draw the impact if asked for."""
     require_folder(figure)
     require_folder(movie)
-    result = film_impact.impact(**given) if movie is None else write_movie(movie, **given)
+    result = film_impact.impact(**arguments) if movie is None else write_movie(movie, **arguments)
     if figure is not None:
-        draw_moments(figure, result, given["diameter"])
+        draw_moments(figure, result, arguments["diameter"])
     return result
 
 

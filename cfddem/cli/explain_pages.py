@@ -53,9 +53,7 @@ def laws() -> dict[str, dict[str, Law]]:
     """All laws by kind and name, including those of installed packages; a contact law by its force."""
     registry.load_built_in_laws()
     registry.load_package_laws()
-    contacts = {
-        each.name: Law(each.name, CONTACT_LAW, each.reference, function=each.force) for each in all_contact_laws()
-    }
+    contacts = {law.name: Law(law.name, CONTACT_LAW, law.reference, function=law.force) for law in all_contact_laws()}
     return {**registry.REGISTRY, CONTACT_LAW: contacts}
 
 
@@ -66,7 +64,7 @@ def of_kind(name: str) -> dict[str, dict[str, Law]]:
     (True, {})
     """
     kind = name.replace("-", "_")
-    return {kind: found} if (found := laws().get(kind)) else {}
+    return {kind: laws_of_kind} if (laws_of_kind := laws().get(kind)) else {}
 
 
 def is_law(name: str) -> bool:
@@ -81,11 +79,11 @@ def containing(word: str) -> dict[str, dict[str, Law]]:
     >>> "exponent_richardson_zaki" in containing("richardson")["bed"]
     True
     """
-    found: dict[str, dict[str, Law]] = {}
+    by_kind: dict[str, dict[str, Law]] = {}
     for law in (law for those in laws().values() for law in those.values()):
         if word.lower() in f"{law.name} {summary(law)['sentence']} {law.reference}".lower():
-            found.setdefault(law.kind, {})[law.name] = law
-    return found
+            by_kind.setdefault(law.kind, {})[law.name] = law
+    return by_kind
 
 
 def find(name: str) -> Law:
@@ -96,21 +94,21 @@ def find(name: str) -> Law:
     """
     kind, _, word = name.replace("-", "_").rpartition(".")
     every = [law for those in laws().values() for law in those.values()]
-    found = [law for law in every if law.name == word and kind in ("", law.kind)]
-    if not found:
+    matching_laws = [law for law in every if law.name == word and kind in ("", law.kind)]
+    if not matching_laws:
         closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
         raise InputError("law", name, f"a name listed by `cfddem explain`{closest}", absent(name))
-    if len(found) > 1:
-        raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
-    return found[0]
+    if len(matching_laws) > 1:
+        raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in matching_laws)}")
+    return matching_laws[0]
 
 
-def _closest(word: str, known: list[str]) -> str:
+def _closest(word: str, names: list[str]) -> str:
     """A question for the closest known name, or the key that stands for a force of CFDEM; empty without one."""
     if word.lower() in OF_CFDEM:
         return f"; see {OF_CFDEM[word.lower()]}"
-    found = nearest(word, known).partition("did you mean ")[2]
-    return f" (did you mean {found}" if found else ""
+    suggestion = nearest(word, names).partition("did you mean ")[2]
+    return f" (did you mean {suggestion}" if suggestion else ""
 
 
 def summary(law: Law) -> dict[str, Any]:
@@ -133,7 +131,7 @@ def page(law: Law) -> list[str]:
     """Documentation of a law as text, at most 100 columns wide."""
     out = [f"{law.name}, {law.kind}   ({law.function.__module__})", ""]
     text = inspect.getdoc(law.function) or ""
-    paragraphs: list[str] = [each for each in text.split("\n\n") if not each.lstrip().startswith(">>>")]
+    paragraphs: list[str] = [paragraph for paragraph in text.split("\n\n") if not paragraph.lstrip().startswith(">>>")]
     for paragraph in paragraphs:
         if paragraph.startswith(".. math::"):
             out += _equation_lines(" ".join(paragraph.removeprefix(".. math::").split()))
@@ -155,7 +153,7 @@ def page(law: Law) -> list[str]:
 def _contact_lines(law: ContactLaw) -> list[str]:
     """Parameters and memory of a contact law."""
     parameters = ", ".join(f"{name} = {value:g}" for name, value in law.parameters.items())
-    memory = ", ".join(f"{each.name} [{each.unit}]" for each in law.memory)
+    memory = ", ".join(f"{field.name} [{field.unit}]" for field in law.memory)
     lines = [f"in a case: [laws] contact = {law.name!r}".replace("'", '"')]
     lines += [f"parameters, in [laws.contact_parameters]: {parameters}"] * bool(parameters)
     lines += [f"memory of a pair: {memory}"] * bool(memory)
@@ -180,10 +178,10 @@ def _solid_brackets(equation: str) -> str:
     return out
 
 
-def listing(known: Mapping[str, Mapping[str, Law]]) -> list[str]:
+def listing(laws_by_kind: Mapping[str, Mapping[str, Law]]) -> list[str]:
     """Laws by kind: one line each, and one for the range if there is one, at most 100 columns wide."""
     out: list[str] = []
-    for kind, those in sorted(known.items()):
+    for kind, those in sorted(laws_by_kind.items()):
         out += ["", kind.replace("_", " ")]
         for law in those.values():
             sentence = plain_words(summary(law)["sentence"])
@@ -312,7 +310,7 @@ def _converter() -> LatexNodes2Text:
 
 
 def _fraction(node: Any, l2tobj: LatexNodes2Text) -> str:
-    over, under = (_bracketed(l2tobj.nodelist_to_text([each])) for each in node.nodeargd.argnlist)
+    over, under = (_bracketed(l2tobj.nodelist_to_text([argument])) for argument in node.nodeargd.argnlist)
     return f" {over}/{under} "
 
 
@@ -326,10 +324,10 @@ def _bracketed(part: str) -> str:
 
 def _plain_indices(text: str) -> str:
     """Text with braces after ^ and _ replaced by round brackets, or by nothing around a word or a number."""
-    while found := re.search(r"([\^_]?)\{([^{}]*)\}", text):
-        mark, inner = found[1], found[2].strip()
+    while braces := re.search(r"([\^_]?)\{([^{}]*)\}", text):
+        mark, inner = braces[1], braces[2].strip()
         bare = not mark or len(inner) == 1 or (inner.isalnum() if mark == "_" else inner.isdigit())
-        text = text[: found.start()] + mark + (inner if bare else f"({inner})") + text[found.end() :]
+        text = text[: braces.start()] + mark + (inner if bare else f"({inner})") + text[braces.end() :]
     text = re.sub(r"\^\(\* ?(\w)\)", r"*^\1", text)
     text = re.sub(r"\^\(\* ?([^()]*)\)", r"*^(\1)", text).replace("^*", "*")
     return re.sub(r"(?<=[\[(]) | (?=[\]),])", "", " ".join(text.split()))
@@ -351,11 +349,11 @@ def matching(name: str) -> dict[str, FieldInfo]:
     """
     every, word = dict(_keys()), name.lower()
     plain = {key: re.sub(r"\.(NAME|NUMBER)\b", "", key).lower() for key in every}
-    found = [
-        key for key in every if any(each == word or each.startswith(f"{word}.") for each in (key.lower(), plain[key]))
+    keys = [
+        key for key in every if any(name == word or name.startswith(f"{word}.") for name in (key.lower(), plain[key]))
     ]
-    found = found or [key for key in every if word in key.lower()]
-    return {key: every[key] for key in found}
+    keys = keys or [key for key in every if word in key.lower()]
+    return {key: every[key] for key in keys}
 
 
 def not_there(name: str) -> list[str]:
@@ -376,10 +374,10 @@ def _keys() -> Iterator[tuple[str, FieldInfo]]:
         if not parts:
             yield name, field
             continue
-        for key, each in parts[0].model_fields.items():
-            yield f"{SEVERAL.get(name, name)}.{key}", each
-            below = f"{SEVERAL.get(name, name)}.{key}{'.NAME' * str(each.annotation).startswith('dict')}"
-            for part in sections_of(each):
+        for key, annotated in parts[0].model_fields.items():
+            yield f"{SEVERAL.get(name, name)}.{key}", annotated
+            below = f"{SEVERAL.get(name, name)}.{key}{'.NAME' * str(annotated.annotation).startswith('dict')}"
+            for part in sections_of(annotated):
                 yield from ((f"{below}.{inner}", rest) for inner, rest in part.model_fields.items())
 
 
@@ -403,7 +401,7 @@ def key_summary(key: str, field: FieldInfo) -> dict[str, Any]:
     """
     meaning, choices = field.description or "", _choices(field)
     units = re.findall(r"\[([^\]]*)\]$", meaning)
-    words = [each.strip(" '\"") for each in choices[0].split(",")] if choices else []
+    words = [choice.strip(" '\"") for choice in choices[0].split(",")] if choices else []
     return {
         "key": key, "required": field.is_required(), "default": _default(field), "meaning": meaning,
         "unit": units[0] if units else None, "choices": words,

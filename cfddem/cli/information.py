@@ -39,28 +39,26 @@ def explain(
     from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
-    known, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
+    by_kind, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
     if law is not None and not pages.is_law(law):
-        known, keys = known or pages.containing(law), pages.matching(law)
+        by_kind, keys = by_kind or pages.containing(law), pages.matching(law)
     require_folder(plot)
-    several, found = bool(known or keys), None
+    several, chosen = bool(by_kind or keys), None
     if plot is not None and several:
         raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
     if not several:
         assert law is not None
-        found = pages.find(law)
-        known = {found.kind: {found.name: found}}
+        chosen = pages.find(law)
+        by_kind = {chosen.kind: {chosen.name: chosen}}
     absent = pages.not_there(law or "")
     if json:
-        every = [pages.summary(each) for kind in known.values() for each in kind.values()]
-        listed = [pages.key_summary(*each) for each in keys.items()]
+        every = [pages.summary(law_of_kind) for kind in by_kind.values() for law_of_kind in kind.values()]
+        listed = [pages.key_summary(*key_and_field) for key_and_field in keys.items()]
         print_json("explain", {"laws": every, "keys": listed, "not_there": " ".join(absent[1:])})
     else:
-        print(
-            "\n".join([*pages.listing(known), *pages.key_lines(keys), *absent] if found is None else pages.page(found))
-        )
-    if plot is not None and found is not None:
-        print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)
+        print("\n".join(pages.page(chosen) if chosen else [*pages.listing(by_kind), *pages.key_lines(keys), *absent]))
+    if plot is not None and chosen is not None:
+        print(pages.plot(chosen, plot), file=sys.stderr if json else sys.stdout)
 
 
 def schema(
@@ -98,8 +96,10 @@ def doctor(
             rows = [("ok" if answer.ok else "FAILS", answer.name, first), *(("", "", line) for line in others)]
             print("\n".join(table(rows, widths=(6, 15))), flush=True)
     if json:
-        print_json("doctor", {"ok": all(each.ok for each in answers), "checks": [asdict(each) for each in answers]})
-    if not all(each.ok for each in answers):
+        print_json(
+            "doctor", {"ok": all(answer.ok for answer in answers), "checks": [asdict(answer) for answer in answers]}
+        )
+    if not all(answer.ok for answer in answers):
         sys.exit(1)
 
 

@@ -312,12 +312,12 @@ SCHEMAS: dict[str, tuple[int, Any]] = {
 
 def form(name: str) -> Any:
     """The form of a schema: that of its results, and the word `schema` itself."""
-    found = SCHEMAS[name][1]
-    if not isinstance(found, str):
-        made = TypedDict(found.__name__, {"schema": str, **get_type_hints(found, include_extras=True)})  # type: ignore[misc]
-        made.__doc__ = found.__doc__
-        return made
-    module, _, kind = found.partition(":")
+    source = SCHEMAS[name][1]
+    if not isinstance(source, str):
+        typed = TypedDict(source.__name__, {"schema": str, **get_type_hints(source, include_extras=True)})  # type: ignore[misc]
+        typed.__doc__ = source.__doc__
+        return typed
+    module, _, kind = source.partition(":")
     return form_of(getattr(import_module(module), kind), {"schema": str})
 
 
@@ -326,11 +326,11 @@ def form_of(kind: Any, more: dict[str, Any] | None = None) -> Any:
 
     more  further names and types
     """
-    shown = {each.name for each in fields(kind) if each.repr} if is_dataclass(kind) else set(kind._fields)
+    shown = {field.name for field in fields(kind) if field.repr} if is_dataclass(kind) else set(kind._fields)
     hints = {name: _in_json(hint) for name, hint in get_type_hints(kind).items() if name in shown}
-    made = TypedDict(kind.__name__, {**(more or {}), **hints})  # type: ignore[misc]
-    made.__doc__ = kind.__doc__
-    return made
+    typed = TypedDict(kind.__name__, {**(more or {}), **hints})  # type: ignore[misc]
+    typed.__doc__ = kind.__doc__
+    return typed
 
 
 def _in_json(hint: Any) -> Any:
@@ -339,7 +339,7 @@ def _in_json(hint: Any) -> Any:
         return Number
     if is_dataclass(hint) or hasattr(hint, "_fields"):
         return form_of(hint)
-    inner = tuple(_in_json(each) if each is not Ellipsis else each for each in get_args(hint))
+    inner = tuple(_in_json(argument) if argument is not Ellipsis else argument for argument in get_args(hint))
     origin = get_origin(hint)
     if origin is UnionType:
         return reduce(or_, inner)

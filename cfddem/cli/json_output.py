@@ -32,9 +32,9 @@ def json_schema(name: str) -> dict[str, Any]:
         raise InputError("name", name, nearest(name, ["case", *SCHEMAS]))
     from pydantic import TypeAdapter
 
-    made = TypeAdapter(form(name)).json_schema()
-    made["properties"]["schema"] |= {"const": word(name)}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": word(name)} | made
+    schema = TypeAdapter(form(name)).json_schema()
+    schema["properties"]["schema"] |= {"const": word(name)}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": word(name)} | schema
 
 
 _printed = False
@@ -75,16 +75,16 @@ def _mistakes(message: str, failure: BaseException | None) -> Iterator[Mistake]:
         for issue in issues:
             yield {"message": str(issue), "key": issue.key, "limit": issue.reason, "remedy": issue.remedy}
         return
-    each: tuple[CfddemError, ...] = getattr(failure, "each", (failure,) if isinstance(failure, InputError) else ())
-    if not each:
+    errors: tuple[CfddemError, ...] = getattr(failure, "each", (failure,) if isinstance(failure, InputError) else ())
+    if not errors:
         for line in message.splitlines():
             yield {"message": line}
-    for error in each:
-        found: Mistake = {"message": str(error)}
+    for error in errors:
+        mistake: Mistake = {"message": str(error)}
         if isinstance(error, InputError):
             place, _, key = error.field.rpartition(" ")  # such as "bed.toml:14: " and "--set "
             value = "" if error.value is None else str(error.value)
-            found |= {
+            mistake |= {
                 "place": place.rstrip(":"), "key": key, "value": value, "limit": error.limit, "remedy": error.remedy,
             }  # fmt: skip
-        yield found
+        yield mistake

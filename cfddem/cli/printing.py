@@ -32,8 +32,8 @@ def with_colour(lines: Iterable[str]) -> Iterator[str]:
 
 def show(values: Mapping[str, Any], units: Mapping[str, str]) -> None:
     """Print a result as aligned lines."""
-    shown = {each: "" if value is None else units.get(each, "") for each, value in values.items()}
-    print("\n".join(table([(each, f"{_readable(values[each])} {unit}") for each, unit in shown.items()], gap=2)))
+    shown = {name: "" if value is None else units.get(name, "") for name, value in values.items()}
+    print("\n".join(table([(name, f"{_readable(values[name])} {unit}") for name, unit in shown.items()], gap=2)))
 
 
 def _readable(value: Any) -> str:
@@ -42,5 +42,5 @@ def _readable(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return ", ".join(_readable(each) for each in value) or "-"
+        return ", ".join(_readable(element) for element in value) or "-"
     return str(value)

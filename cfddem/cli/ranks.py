@@ -60,12 +60,12 @@ def on_ranks(ranks: int | None, threads: int | None, folder: Path, division: str
         from cfddem.backend.compile import use_threads
 
         use_threads(threads or 1)
-    found = communicator()
+    world = communicator()
     if started > 1:
-        found.shape = shape
+        world.shape = shape
     if PROCESSES in os.environ:
-        (Path(os.environ[PROCESSES]) / str(os.getpid())).write_text(str(found.rank), encoding="utf-8")
-    return found
+        (Path(os.environ[PROCESSES]) / str(os.getpid())).write_text(str(world.rank), encoding="utf-8")
+    return world
 
 
 def _start(ranks: int, threads: int | None, folder: Path) -> NoReturn:
@@ -107,8 +107,8 @@ def _forward_signals(launcher: subprocess.Popen[bytes]) -> None:
         if not (number == signal.SIGINT and _in_foreground()):
             launcher.send_signal(number)
 
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, forward)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, forward)
 
 
 def _in_foreground() -> bool:
@@ -141,8 +141,8 @@ def _killed_by(text: str, code: int) -> int:
 
     text  of the launcher: MPICH names the signal there, and ends with its number; Open MPI ends with 128 more
     """
-    if found := re.search(r"EXIT STRING: .*\(signal (\d+)\)", text):
-        return int(found[1])
+    if killed := re.search(r"EXIT STRING: .*\(signal (\d+)\)", text):
+        return int(killed[1])
     if code < 0:
         return -code
     return code - 128 if code > 128 and code not in STOPPED else 0
@@ -150,8 +150,8 @@ def _killed_by(text: str, code: int) -> int:
 
 def _killed(text: str, number: int, processes: Path, folder: Path) -> str:
     """What to say of a killed rank."""
-    found = re.search(r"PID (\d+) RUNNING AT", text)
-    file = processes / found[1] if found else processes
+    killed = re.search(r"PID (\d+) RUNNING AT", text)
+    file = processes / killed[1] if killed else processes
     which = f"rank {file.read_text(encoding='utf-8')}" if file.is_file() else "a rank"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
     why = ", by hand or because memory ran out" if number == signal.SIGKILL else ""

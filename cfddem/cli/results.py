@@ -101,7 +101,9 @@ def compare(
 
     require_folder(output)
     folders = [
-        run for each in folders for run in ([each] if (each / "run.json").exists() else runs_inside(each) or [each])
+        run
+        for folder in folders
+        for run in ([folder] if (folder / "run.json").exists() else runs_inside(folder) or [folder])
     ]
     if output.suffix.lower() not in (".html", ".png"):
         raise InputError("output", str(output), "a file that ends in .html or .png")

@@ -47,20 +47,20 @@ def command(
     """
     lines = descriptions(function)
     parameters: dict[str, inspect.Parameter] = {}
-    for name, given in inspect.signature(function, eval_str=True).parameters.items():
-        kind = _simple(given.annotation)
-        if kind is not None and given.default is not inspect.Parameter.empty:
-            parameters[name] = _option(name, kind, given.default, lines.get(name, ""))
+    for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
+        kind = _simple(parameter.annotation)
+        if kind is not None and parameter.default is not inspect.Parameter.empty:
+            parameters[name] = _option(name, kind, parameter.default, lines.get(name, ""))
     for name, (kind, default, text) in (options or {}).items():
         parameters[name] = _option(name, kind, default, text)
 
-    defaults = {name: each.default for name, each in parameters.items()}
+    defaults = {name: option.default for name, option in parameters.items()}
 
-    def run(**given: Any) -> None:
-        as_json = given.pop("json", False)
+    def run(**arguments: Any) -> None:
+        as_json = arguments.pop("json", False)
         if not as_json:
             announce_compilation()
-        result = (call or function)(**defaults | given)
+        result = (call or function)(**defaults | arguments)
         if as_json:
             print_json(schema if isinstance(schema, str) else schema(result), result.summary())
         elif show_result is None:
@@ -85,17 +85,17 @@ def descriptions(function: Callable[..., Any]) -> dict[str, str]:
     >>> descriptions(area)["height"]
     'of one side, without the rim [m]'
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     names: list[str] = []
     for line in (inspect.getdoc(function) or "").splitlines():
         if match := re.fullmatch(r"(\w+(?:, \w+)*) {2,}(\S.*)", line):
             names = match[1].split(", ")
-            found |= dict.fromkeys(names, match[2])
+            texts |= dict.fromkeys(names, match[2])
         elif names and line.startswith("  "):
-            found |= dict.fromkeys(names, f"{found[names[0]]} {line.strip()}")
+            texts |= dict.fromkeys(names, f"{texts[names[0]]} {line.strip()}")
         else:
             names = []
-    return found
+    return texts
 
 
 def _simple(annotation: Any) -> Any:

@@ -110,15 +110,15 @@ def sweep(
     failed = list(failures(outcomes))
     for line in failed:
         print(f"cfddem: {line}", file=sys.stderr)
-    found = None
-    if asked is not None and not any(each.status == "waiting" for each in outcomes):
-        found = of_keys.sensitivity(asked.design, asked.varied, outcomes)
-        of_keys.write_results(found, folder)
+    sensitivity = None
+    if asked is not None and not any(outcome.status == "waiting" for outcome in outcomes):
+        sensitivity = of_keys.sensitivity(asked.design, asked.varied, outcomes)
+        of_keys.write_results(sensitivity, folder)
     if json:
-        runs_made = [each.summary() for each in outcomes]
-        print_json("sweep", {"folder": folder, "runs": runs_made, "sensitivity": found and found.summary()})
+        runs_made = [outcome.summary() for outcome in outcomes]
+        print_json("sweep", {"folder": folder, "runs": runs_made, "sensitivity": sensitivity and sensitivity.summary()})
     else:
-        print("\n".join([*(found.lines() if found else ()), f"table and figure written to {folder}"]))
+        print("\n".join([*(sensitivity.lines() if sensitivity else ()), f"table and figure written to {folder}"]))
     if failed:
         sys.exit(3)
 
@@ -184,25 +184,25 @@ def calibrate(
         if case is not None or effort.jobs != 1:
             raise InputError("--collide", collide, "used without a case and without --jobs")
         folder = output or Path("collide-calibration")
-        made = _of_collisions(collide, match or (), vary, set or (), effort.trials, progress)
+        of_collisions = _of_collisions(collide, match or (), vary, set or (), effort.trials, progress)
         make_output(folder)
-        write_results(made, folder)
-        _print(made, folder, json)
+        write_results(of_collisions, folder)
+        _print(of_collisions, folder, json)
         return
     path = find_case(case)
     print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
     folder = output or Path(f"{path.stem}-calibration")
 
-    found = search(
+    of_runs = search(
         path, match or (), variables(vary), folder, trials=effort.trials, jobs=effort.jobs,
         overrides=overrides(set or []),
         progress=progress,
     )  # fmt: skip
-    _print(found, folder, json)
+    _print(of_runs, folder, json)
 
 
 def _of_collisions(
-    material: str, match: Sequence[Path], vary: Sequence[str], given: Sequence[str], trials: int,
+    material: str, match: Sequence[Path], vary: Sequence[str], changes: Sequence[str], trials: int,
     progress: Callable[[Trial], None],
 ) -> Calibration:  # fmt: skip
     """The calibration of collisions."""
@@ -210,25 +210,28 @@ def _of_collisions(
     from scenarios.collisions.immersed_pair.calibration import fit, key_of, settings
 
     varied = variables(vary, key_of)
-    return fit(material, match, varied, settings(given), trials=trials, progress=progress)
+    return fit(material, match, varied, settings(changes), trials=trials, progress=progress)
 
 
-def _print(found: Calibration, folder: Path, json: bool) -> None:
+def _print(calibration: Calibration, folder: Path, json: bool) -> None:
     """Print a result; ends with code 3 where every trial has failed."""
     if json:
-        print_json("calibrate", {"folder": folder, **found.summary()})
+        print_json("calibrate", {"folder": folder, **calibration.summary()})
     else:
-        print("\n".join(lines(found.summary(), folder)))
-    if not found.finished:
+        print("\n".join(lines(calibration.summary(), folder)))
+    if not calibration.finished:
         sys.exit(3)
 
 
 def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
     """The result of a calibration as text."""
     out = [""]
-    for each in result["estimates"]:
-        value = f"{each['value']:.4g} +- {each['error']:.2g}"
-        out += [f"{each['key']:<34} {value:<22} of {each['low']:g} to {each['high']:g}", f"  {each['verdict']}"]
+    for estimate in result["estimates"]:
+        value = f"{estimate['value']:.4g} +- {estimate['error']:.2g}"
+        out += [
+            f"{estimate['key']:<34} {value:<22} of {estimate['low']:g} to {estimate['high']:g}",
+            f"  {estimate['verdict']}",
+        ]
     if not result["estimates"]:
         out.append("too few finished trials for an estimate; repeat the command with more --trials")
     if result["best"] is not None:

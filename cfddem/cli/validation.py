@@ -53,11 +53,11 @@ def validate(
     names = [name for name in TARGETS if name not in ONLY_IF_NAMED] if target == "all" else [target]
     if json:
         targets = [measure(name, output, data or (), hours) for name in names]
-        held = [each["holds"] for each in targets]
-        print_json("validate", {"holds": all(held), "targets": targets})
+        verdicts = [target["holds"] for target in targets]
+        print_json("validate", {"holds": all(verdicts), "targets": targets})
     else:
-        held = [run(name, output, data or (), hours) for name in names]  # every target runs, even after a failure
-    if not all(held):
+        verdicts = [run(name, output, data or (), hours) for name in names]  # every target runs, even after a failure
+    if not all(verdicts):
         sys.exit(1)
 
 
