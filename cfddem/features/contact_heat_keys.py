@@ -168,20 +168,20 @@ class ContactHeat(FeatureTable):
             raise InputError("bed.fixed", True, "false with conduction through contacts", remedy)
 
     def _refuse_temperatures(self, case: Any) -> None:
-        temperature = self.particle_temperature
+        start = self.particle_temperature
         if Heat.of(case):
-            if temperature is not None:
+            if start is not None:
                 remedy = "it has heat.particle_temperature"
                 raise InputError("contact_heat.particle_temperature", None, "left out with [heat]", remedy)
             return
-        if temperature is None:
+        if start is None:
             raise InputError("contact_heat.particle_temperature", None, "given, or [heat]", "[K]")
-        by_name = temperature if isinstance(temperature, dict) else {}
+        by_name = start if isinstance(start, dict) else {}
         for name, value in by_name.items():
             if name not in case.species:
                 raise InputError(f"contact_heat.particle_temperature.{name}", value, nearest(name, list(case.species)))
         for name in case.species:
-            value = by_name.get(name, math.nan) if isinstance(temperature, dict) else temperature
+            value = by_name.get(name, math.nan) if isinstance(start, dict) else start
             if math.isnan(value):
                 raise InputError(f"contact_heat.particle_temperature.{name}", None, "given for every species", "[K]")
             if value < 0.0:
@@ -206,10 +206,8 @@ class ContactHeat(FeatureTable):
 
     def start_temperatures(self, case: Any) -> np.ndarray:
         """Temperature of new particles by number of species [K]."""
-        temperature = self.particle_temperature
-        return np.array(
-            [temperature[name] if isinstance(temperature, dict) else temperature for name in case.species], float
-        )
+        start = self.particle_temperature
+        return np.array([start[name] if isinstance(start, dict) else start for name in case.species], float)
 
     @property
     def jump(self) -> float:
