@@ -126,11 +126,11 @@ def bench(
         for name, run in runs.items():
             speeds[name].append(_speed(run, steps))
         for style, name in {} if note else STYLES.items():
-            found = speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
-            if isinstance(found, str):
-                note = found
+            rate = speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
+            if isinstance(rate, str):
+                note = rate
                 break
-            speeds.setdefault(name, []).append(found)
+            speeds.setdefault(name, []).append(rate)
     medians = {name: statistics.median(measured) for name, measured in speeds.items()}
     ratios = {name: medians["cfddem"] / medians[name] for name in medians if name != "cfddem"}
     run = runs["cfddem"]
@@ -236,8 +236,8 @@ def speed(
         finished = subprocess.run(command, capture_output=True, text=True, check=False)
         loops = re.findall(r"Loop time of (\S+) on .* for (\d+) steps with (\d+) atoms", _text(log))[1:]
         if finished.returncode != 0 or not loops:
-            said = [line for line in (finished.stderr + finished.stdout + _text(log)).splitlines() if line.strip()]
-            return f"did not run: {said[-1].strip() if said else f'exit code {finished.returncode}'}"
+            lines = [line for line in (finished.stderr + finished.stdout + _text(log)).splitlines() if line.strip()]
+            return f"did not run: {lines[-1].strip() if lines else f'exit code {finished.returncode}'}"
     return statistics.median(int(done) * int(atoms) / float(taken) / 1e6 for taken, done, atoms in loops)
 
 

@@ -87,11 +87,11 @@ def measure(cells: tuple[int, int, int], speed: float) -> dict[str, Any]:
 def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """A result as lines of a table."""
     yield "fluid step", f"{result['threads']} thread(s), triad {result['triad [GB/s]']:.1f} GB/s"
-    for each in result["boxes"]:
-        cells, step = each["cells"], each["step [s]"]
+    for box in result["boxes"]:
+        cells, step = box["cells"], box["step [s]"]
         name = kept_speeds.fluid_box(cells, result["threads"])
         yield (
             " x ".join(str(count) for count in cells),
-            f"{step:.4f} s, {1e9 * step / np.prod(cells):.0f} ns a cell, {each['pressure iterations']:.1f} pressure "
-            f"iterations, {each['share of the triad']:.2f} of the triad{kept_speeds.beside(name, 1.0 / step)}",
+            f"{step:.4f} s, {1e9 * step / np.prod(cells):.0f} ns a cell, {box['pressure iterations']:.1f} pressure "
+            f"iterations, {box['share of the triad']:.2f} of the triad{kept_speeds.beside(name, 1.0 / step)}",
         )

@@ -18,8 +18,8 @@ FILE = Path(__file__).parents[1] / "data" / "speed.json"
 @cache
 def kept() -> dict[str, Any]:
     """The file: `machine`, `triad [GB/s]`, and `speeds` by name."""
-    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
-    return found
+    speeds: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return speeds
 
 
 def beside(name: str, speed: float) -> str:
@@ -28,8 +28,8 @@ def beside(name: str, speed: float) -> str:
     name   of the benchmark, as :func:`speeds` has it
     speed  of this machine, in the unit of the benchmark
     """
-    known = kept()["speeds"].get(name)
-    return f"; {speed / known:.2f} times as fast as kept, {kept()['machine']}" if known else ""
+    earlier = kept()["speeds"].get(name)
+    return f"; {speed / earlier:.2f} times as fast as kept, {kept()['machine']}" if earlier else ""
 
 
 def dense_bed(result: dict[str, Any]) -> str:

@@ -94,9 +94,9 @@ def _particles(group: str, name: str, run: ParticleSolver, speed: float) -> dict
 
 def _fluid(edge: int, speed: float) -> dict[str, Any]:
     """One row: a cube of fluid."""
-    found = fluid_box.measure((edge, edge, edge), speed)
+    measured = fluid_box.measure((edge, edge, edge), speed)
     cells = edge**3
-    return _row("cells", f"{edge}^3", found["step [s]"] / cells, found["bytes"] / cells, speed)
+    return _row("cells", f"{edge}^3", measured["step [s]"] / cells, measured["bytes"] / cells, speed)
 
 
 def _row(group: str, name: str, seconds: float, moved: float, speed: float) -> dict[str, Any]:
@@ -109,10 +109,10 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "memory", f"triad {result['triad [GB/s]']:.1f} GB/s on one thread"
     for name, count in result["bytes"].items():
         yield name, f"{count:.0f} bytes a step"
-    for each in result["rows"]:
-        best = 1e9 * each["bytes"] / GPU
+    for row in result["rows"]:
+        best = 1e9 * row["bytes"] / GPU
         yield (
-            each["group"],
-            f"{each['name']:<20} {each['ns']:8.1f} ns, {each['bytes']:6.0f} bytes, {each['share']:.2f} of the triad; "
+            row["group"],
+            f"{row['name']:<20} {row['ns']:8.1f} ns, {row['bytes']:6.0f} bytes, {row['share']:.2f} of the triad; "
             f"at {GPU / 1e12:g} TB/s not below {best:.2f} ns",
         )

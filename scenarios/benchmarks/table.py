@@ -23,11 +23,11 @@ Benchmark = tuple[Callable[[int], dict[str, Any]], Callable[[dict[str, Any]], It
 def benchmarks() -> dict[str, Benchmark]:
     """Name -> function of the number of threads, and its lines."""
     bed, lines = dense_bed.bench, dense_bed.rows
-    found: dict[str, Benchmark] = {"dense bed of 10000, bridges": (partial(bed, 10_000, bridges=True), lines)}
+    table: dict[str, Benchmark] = {"dense bed of 10000, bridges": (partial(bed, 10_000, bridges=True), lines)}
     for size in SIZES:
-        found[f"dense bed of {size}"] = partial(bed, size), lines
-        found[f"dense bed of {size}, films"] = partial(bed, size, film=True), lines
-    return found | {"fluid": (fluid_box.bench, fluid_box.rows), "gas bed": (gas_bed.bench, gas_bed.rows)}
+        table[f"dense bed of {size}"] = partial(bed, size), lines
+        table[f"dense bed of {size}, films"] = partial(bed, size, film=True), lines
+    return table | {"fluid": (fluid_box.bench, fluid_box.rows), "gas bed": (gas_bed.bench, gas_bed.rows)}
 
 
 def bench(threads: int = 1) -> dict[str, Any]:

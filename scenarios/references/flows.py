@@ -88,7 +88,7 @@ def ghia(line: str, reynolds: int) -> dict[str, Array]:
     columns = {name: np.array(column) for name, column in reference("ghia1982_cavity").items()}
     here = (columns["line"] == line) & (columns["reynolds"].astype(int) == reynolds)
     return {
-        name: np.array([float(each) if each else np.nan for each in columns[name][here]])
+        name: np.array([float(text) if text else np.nan for text in columns[name][here]])
         for name in ("position", "velocity", "spectral")
     }
 

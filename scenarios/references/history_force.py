@@ -180,7 +180,7 @@ def around_impact() -> list[Impulse]:
     after, lasting = times[1:] - bouncing_sphere.contact_time(path), np.diff(times)
     scale = fall.steel().density * 4.0 / 3.0 * math.pi * fall.radius**3 * fall.speed
     return [
-        Impulse(begin, end, *((each * lasting)[(after > begin) & (after <= end)].sum() / scale for each in forces))
+        Impulse(begin, end, *((force * lasting)[(after > begin) & (after <= end)].sum() / scale for force in forces))
         for begin, end in pairwise(AROUND)
     ]
 
@@ -204,7 +204,7 @@ def in_elapsed_time(times: Array, slips: Array, fall: bouncing_sphere.Fall) -> A
             own = _integral((end - begin) * place**2) * 2.0 * place * change[n] / (end - begin)
             memory = _integral(begin + (end - begin) * place - elapsed[: n + 1])
             forces[n] += weight * (own - (np.diff(memory) / np.diff(elapsed[: n + 1])) @ change[:n])
-    amplitude = np.array([basset(each, 0.0, diameter, fall.kinematic_viscosity) for each in scale])
+    amplitude = np.array([basset(time, 0.0, diameter, fall.kinematic_viscosity) for time in scale])
     return 3.0 * math.pi * fall.viscosity * diameter * amplitude * forces
 
 

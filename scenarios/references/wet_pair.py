@@ -70,7 +70,7 @@ def integrate(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Mo
     slopes, active = specialise(rates, choices), specialise(activity, choices)
     # a pair almost at rest is tried with ever longer steps; one whose end is not a number is made again, shorter
     with np.errstate(invalid="ignore", over="ignore"):
-        found = solve_ivp(
+        solution = solve_ivp(
             lambda _, state: slopes(state, pair),
             (0.0, duration / unit),
             state,
@@ -84,12 +84,12 @@ def integrate(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Mo
             atol=ABSOLUTE,
             first_step=min(1e-3, duration / unit),
         )
-    if found.status < 0:
-        raise RunFailed(f"the pair cannot be followed beyond t = {found.t[-1] * unit:.6g} s: {found.message}")
-    gap, turned, approach, turning, spin, _ = found.y
+    if solution.status < 0:
+        raise RunFailed(f"the pair cannot be followed beyond t = {solution.t[-1] * unit:.6g} s: {solution.message}")
+    gap, turned, approach, turning, spin, _ = solution.y
     return Motion(
-        separated=len(found.t_events[0]) > 0,
-        time=found.t * unit,
+        separated=len(solution.t_events[0]) > 0,
+        time=solution.t * unit,
         gap=gap * pair.film,
         angle=turned,
         approach=approach * pair.speed,

@@ -79,19 +79,22 @@ def sedimentation(progress: Progress) -> list[Row]:
     case = vessel()
     fluid = case.required_fluid
     for place, viscosity in (("water", fluid.viscosity), ("syrup", SYRUP), ("water, between walls", None)):
-        found: list[Settling] = []
+        settlings: list[Settling] = []
         for share in SOLID_FRACTIONS:
             progress(f"sedimentation in {place} at a solid fraction of {share:g}")
-            found.append(between_walls(share) if viscosity is None else in_periodic_box(share, viscosity=viscosity))
-        reynolds = fluid.density * found[0].terminal * case.bed.diameter / (viscosity or fluid.viscosity)
+            settlings.append(between_walls(share) if viscosity is None else in_periodic_box(share, viscosity=viscosity))
+        reynolds = fluid.density * settlings[0].terminal * case.bed.diameter / (viscosity or fluid.viscosity)
         law = exponent_richardson_zaki(reynolds, 0.0)
-        own, start = exponent(found)
-        points = [{"at": each.solid_fraction, "value": each.velocity, "reference": each.terminal} for each in found]
+        own, start = exponent(settlings)
+        points = [
+            {"at": settling.solid_fraction, "value": settling.velocity, "reference": settling.terminal}
+            for settling in settlings
+        ]
         rows += [
             Row(f"settling in {place}: exponent", own, law, 0.1 * law, points=points),
             Row(
                 f"settling in {place}: velocity at zero solid fraction over that of one sphere",
-                start / found[0].terminal,
+                start / settlings[0].terminal,
                 1.0,
             ),
         ]
@@ -204,11 +207,11 @@ def bubbles(run: RunData, begin: float) -> BubbleProfile:
     assert run.grid is not None
     places = np.flatnonzero(run.times > begin)
     surfaces = np.interp(run.times[places], run.history["time"], run.history["bed_height"])
-    seen = [
+    profiles = [
         find_bubbles(run.fluid("voidage", int(place)), run.grid.spacing, surface=float(surface), flat=True)
         for place, surface in zip(places, surfaces)
     ]
-    return bubble_profile(seen, SLABS)
+    return bubble_profile(profiles, SLABS)
 
 
 def growing(profile: BubbleProfile) -> list[Row]:
@@ -298,9 +301,9 @@ def variants(case: Case) -> dict[str, tuple[dict[str, Any], str]]:
     step = case.run.particle_step
     assert step is not None
     stiffer = {
-        f"material.{name}.contact_modulus": 4.0 * each.contact_modulus
-        for name, each in case.material.items()
-        if each.contact_modulus is not None
+        f"material.{name}.contact_modulus": 4.0 * material.contact_modulus
+        for name, material in case.material.items()
+        if material.contact_modulus is not None
     }
     half = {"run.particle_step": 0.5 * step}
     return {
@@ -325,14 +328,14 @@ def refined(folder: Path, progress: Progress) -> list[Row]:
     """A liquid bed and a gas bed that slugs."""
     rows = []
     for name, bed in (("liquid bed", liquid()), ("slugging gas bed", gas())):
-        found: dict[str, Means] = {}
+        by_change: dict[str, Means] = {}
         for change, (changes, other) in variants(bed.case).items():
             limits = {"run.until": bed.until, "run.average_from": bed.averaged_from}
-            found[change] = means(
+            by_change[change] = means(
                 finished(bed.case, folder, _home(name, change), progress, changes | limits), bed.averaged_from
             )
             if other:
-                rows += compared(f"{name}, {change}", found[change], found[other], gusty=name != "liquid bed")
+                rows += compared(f"{name}, {change}", by_change[change], by_change[other], gusty=name != "liquid bed")
     progress("particles of the slugging gas bed in finer cells")
     return [*rows, *same_particles(gas(), open_run(folder / _home("slugging gas bed", "as it is")))]
 

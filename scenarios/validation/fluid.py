@@ -42,10 +42,13 @@ def orders(curves: Curves) -> list[Row]:
         ("manufactured, model A", [error(n, n // 2, model="A")[:2] for n in cells]),
         ("manufactured, model B", [error(n, n // 2, model="B")[:2] for n in cells]),
     ):
-        for what, found in zip(("velocity", "pressure"), zip(*errors)):
+        for field, errors_of_field in zip(("velocity", "pressure"), zip(*errors)):
             # an order above 2 passes, too
-            rows.append(Row(f"{name}: order in L2, {what}", min(min(order(found)), 2.0), 2.0, 0.1))
-            curves[f"order/{name}/{what}"] = {"cells": (np.array(cells), "-"), "error": (np.array(found), "-")}
+            rows.append(Row(f"{name}: order in L2, {field}", min(min(order(errors_of_field)), 2.0), 2.0, 0.1))
+            curves[f"order/{name}/{field}"] = {
+                "cells": (np.array(cells), "-"),
+                "error": (np.array(errors_of_field), "-"),
+            }
     limited = order([taylor_green(n, n // 4, "limited")[0] for n in cells])
     return [*rows, Row("vortices: order in L2, velocity, limited scheme", min(limited), 2.0)]
 

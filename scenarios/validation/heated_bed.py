@@ -94,12 +94,12 @@ def temperatures(laws: Mapping[str, Any], times: tuple[float, ...] = TIMES) -> d
     place = simulation.particles.position
     at_axis = (np.abs(place[:, 1:] - (0.5 * DEPTH, 0.5 * HEIGHT)) < 2.0 * DIAMETER).all(axis=1)  # local: two axes
     at = {depth: at_axis & (np.abs(LENGTH - 0.01 * depth - place[:, 0]) < DIAMETER) for depth in LIMITS}
-    found: dict[float, list[float]] = {depth: [] for depth in LIMITS}
+    by_depth: dict[float, list[float]] = {depth: [] for depth in LIMITS}
     for time in times:
         simulation.until(time)
         for depth, inside in at.items():
-            found[depth].append(float(simulation.particles.temperature[inside].mean()) - ZERO)  # local: one process
-    return {depth: np.array(values) for depth, values in found.items()}
+            by_depth[depth].append(float(simulation.particles.temperature[inside].mean()) - ZERO)  # local: one process
+    return {depth: np.array(values) for depth, values in by_depth.items()}
 
 
 def measured(depth: float) -> np.ndarray:
@@ -109,7 +109,7 @@ def measured(depth: float) -> np.ndarray:
     rows = (np.array(table["kind"]) == "measured") & (columns[0] == depth)
     time, value = columns[1][rows], columns[2][rows]
     near = [(time > 3900.0) if at == TIMES[-1] else (np.abs(time - at) <= 150.0) for at in TIMES]
-    return np.array([value[each].mean() for each in near])  # local: of a table
+    return np.array([value[nearest].mean() for nearest in near])  # local: of a table
 
 
 def slab(time: np.ndarray, depth: float, diffusivity: float, lag: float) -> np.ndarray:
@@ -122,14 +122,14 @@ def slab(time: np.ndarray, depth: float, diffusivity: float, lag: float) -> np.n
     return np.asarray(COLD + (HOT - COLD) * (erfc(near) - np.exp(-(near**2)) * erfcx(far)))
 
 
-def as_slab(found: Mapping[float, np.ndarray]) -> tuple[float, float, float]:
+def as_slab(by_depth: Mapping[float, np.ndarray]) -> tuple[float, float, float]:
     """The slab nearest to temperatures by depth [cm] at `TIMES`: its diffusivity [m2/s], its lag [m], and the largest
     difference [K]."""
     time = np.array(TIMES, float)
 
     def apart(numbers: np.ndarray) -> float:
-        each = (slab(time, 0.01 * depth, *np.exp(numbers)) - values for depth, values in found.items())
-        return float(np.abs(np.concatenate(list(each))).max())  # local: of a few curves
+        deviations = (slab(time, 0.01 * depth, *np.exp(numbers)) - values for depth, values in by_depth.items())
+        return float(np.abs(np.concatenate(list(deviations))).max())  # local: of a few curves
 
     starts = [np.log([3e-7, lag]) for lag in (1e-4, 3e-3)]
     best = min((minimize(apart, start, method="Nelder-Mead") for start in starts), key=lambda result: result.fun)
@@ -139,12 +139,12 @@ def as_slab(found: Mapping[float, np.ndarray]) -> tuple[float, float, float]:
 def rough(curves: Curves) -> list[Row]:
     """Rough contacts and gas, at three depths beside the measurement."""
     name = next(iter(LAWS))
-    found = temperatures(LAWS[name])
+    by_depth = temperatures(LAWS[name])
     curves["rough"] = {"time": (np.array(TIMES, float), "s")} | {
-        f"at {depth:g} cm": (values, "degC") for depth, values in found.items()
+        f"at {depth:g} cm": (values, "degC") for depth, values in by_depth.items()
     }
     rows = []
-    for depth, values in found.items():
+    for depth, values in by_depth.items():
         points = list(zip(TIMES, values, measured(depth)))
         rows.append(worst(f"{name}: at {depth:g} cm", points, LIMITS[depth], unit="degC"))
         rows.append(
@@ -157,27 +157,29 @@ def others(curves: Curves) -> list[Row]:
     """Other laws beside the measurement; gas around contacts alone beside the simulation of the thesis, too."""
     rows = []
     for name in list(LAWS)[1:]:
-        found = temperatures(LAWS[name])
-        curves[name] = {f"at {depth:g} cm": (values, "degC") for depth, values in found.items()}
+        by_depth = temperatures(LAWS[name])
+        curves[name] = {f"at {depth:g} cm": (values, "degC") for depth, values in by_depth.items()}
         rows += [
             worst(f"{name}: at {depth:g} cm", zip(TIMES, values, measured(depth)), unit="degC")
-            for depth, values in found.items()
+            for depth, values in by_depth.items()
         ]
         if "alone" in name:
             rows += [
                 worst(f"{name}, against the simulation of the thesis: at {depth:g} cm", points, unit="degC")
-                for depth, points in _beside_the_thesis(found).items()
+                for depth, points in _beside_the_thesis(by_depth).items()
             ]
     return rows
 
 
-def _beside_the_thesis(found: Mapping[float, np.ndarray]) -> dict[float, list[tuple[float, float, float]]]:
+def _beside_the_thesis(by_depth: Mapping[float, np.ndarray]) -> dict[float, list[tuple[float, float, float]]]:
     """Time [s], temperature here and simulated in the thesis [C], by depth."""
     table = reference("beaulieu2020_heated_bed")
     kind = np.array(table["kind"]) == "simulated"
-    depth, time, value = (np.array(table[each], float)[kind] for each in ("depth [cm]", "time [s]", "temperature [C]"))
+    depth, time, value = (
+        np.array(table[heading], float)[kind] for heading in ("depth [cm]", "time [s]", "temperature [C]")
+    )
     result = {}
-    for at, values in found.items():
+    for at, values in by_depth.items():
         there = np.interp(time[depth == at], TIMES, values)
         result[at] = list(zip(time[depth == at].tolist(), there.tolist(), value[depth == at].tolist()))
     return result
@@ -211,7 +213,7 @@ PLATE = {"density": 2700.0, "youngs_modulus": 100e9, "contact_modulus": 50e6, "p
 
 
 def _solids(friction: float) -> list[Material]:
-    return [Material(**each, friction=friction, rolling_friction=0.02) for each in (STEEL, PLATE)]
+    return [Material(**material, friction=friction, rolling_friction=0.02) for material in (STEEL, PLATE)]
 
 
 def poured() -> np.ndarray:

@@ -63,5 +63,5 @@ def kept(path: Path, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         numbers = compute()
         with replacing(path) as fresh:
             fresh.write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    runs: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return runs

@@ -125,12 +125,14 @@ ENGINE: tuple[dict[str, Any], ...] = (
 def engine_pairs(_: Path, __: Curves) -> list[Row]:
     """Wet pair: the particle engine, with its contact and a liquid bridge, against the polar equations."""
     restitutions, differences, spins, times = [], [], [], []
-    for given in ENGINE:
-        polar, engine = exact_pair(**given), collide_wet(**given)
-        restitutions.append((given["stokes"], engine.restitution / polar.restitution, 1.0))
-        differences.append((given["stokes"], engine.restitution, polar.restitution))
-        spins.append((given["stokes"], engine.spin / polar.spin, 1.0))
-        times.append((given["stokes"], (engine.separation_time or math.nan) / (polar.separation_time or math.nan), 1.0))
+    for impact in ENGINE:
+        polar, engine = exact_pair(**impact), collide_wet(**impact)
+        restitutions.append((impact["stokes"], engine.restitution / polar.restitution, 1.0))
+        differences.append((impact["stokes"], engine.restitution, polar.restitution))
+        spins.append((impact["stokes"], engine.spin / polar.spin, 1.0))
+        times.append(
+            (impact["stokes"], (engine.separation_time or math.nan) / (polar.separation_time or math.nan), 1.0)
+        )
     return [
         worst("particle engine over polar equations: restitution", restitutions, 0.01),
         worst("particle engine: restitution against the polar equations", differences, 0.005),

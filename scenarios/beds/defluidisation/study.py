@@ -69,11 +69,11 @@ def onset(case: Case, history: Mapping[str, np.ndarray], bed: Layers, *, rising:
     if packed.sum() < 4:
         raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
     begin, end = history["time"][packed][[0, -1]]
-    seen = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
-    if len(seen) == 0:
+    voidages = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
+    if len(voidages) == 0:
         raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
     velocity = np.interp(history["time"], times, speeds)
-    return _onset(case, velocity[packed], share[packed], seen.mean(axis=0))
+    return _onset(case, velocity[packed], share[packed], voidages.mean(axis=0))
 
 
 def _packed(share: np.ndarray, branch: np.ndarray, rising: bool) -> np.ndarray:
@@ -90,14 +90,14 @@ def _packed(share: np.ndarray, branch: np.ndarray, rising: bool) -> np.ndarray:
 def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:
     powers = np.stack([velocity, velocity**2], axis=1)
     (viscous, inertial), *_ = np.linalg.lstsq(powers, share, rcond=None)
-    found = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
+    onset_velocity = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
     assert case.laws.drag_law is not None
     own = float(np.average(voidage, weights=1.0 - voidage))
     balance = fluidising_velocity(
         case.bed.diameter, case.solid.density, case.required_fluid.density, case.required_fluid.viscosity, own,
         in_layers(case.laws.drag_law.function, voidage), abs(case.laws.gravity[2]),
     )  # fmt: skip
-    return Onset(float(found), own, balance)
+    return Onset(float(onset_velocity), own, balance)
 
 
 def in_layers(drag: Drag, voidages: np.ndarray) -> Drag:

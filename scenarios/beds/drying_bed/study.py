@@ -90,8 +90,8 @@ def balance(described: Case, water: float, capacity: float) -> Balance:
     for _ in range(60):
         middle = 0.5 * (low + high)
         surface = vapour_fraction(min(saturation_pressure(middle), keys.pressure), keys.pressure)
-        given = heat.fluid_heat_capacity * (inlet - middle)
-        low, high = (middle, high) if given > latent_heat(middle) * (surface - inflow) else (low, middle)
+        sensible = heat.fluid_heat_capacity * (inlet - middle)
+        low, high = (middle, high) if sensible > latent_heat(middle) * (surface - inflow) else (low, middle)
     ramp = _ramp(described)
     flow = described.fluid.density * described.column.floor_area * float(ramp[-1, 1])
     missed = float(np.trapezoid(ramp[-1, 1] - ramp[:, 1], ramp[:, 0]) / ramp[-1, 1])  # time, while the inlet opens
@@ -112,17 +112,17 @@ def drying(described: Case) -> tuple[Drying, Balance]:
     while simulation.time < described.run.until - 1e-9:
         simulation.until(simulation.time + (described.run.history_every or 0.01))
         rows.append(row(simulation))
-    found = {name: np.array([each[name] for each in rows]) for name in rows[0]}
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     area = described.fluid.density * described.column.floor_area
-    gone = np.append(0.0, found["evaporated_mass"])
+    gone = np.append(0.0, columns["evaporated_mass"])
     result = Drying(
-        time=found["time"],
-        water=found["evaporated_mass"] / water,
-        temperature=found["mean_temperature"],
-        outlet=found["outlet_vapour"],
-        rate=np.diff(gone) / np.diff(np.append(0.0, found["time"])),
-        by_air=area * np.interp(found["time"], *_ramp(described).T) * (found["outlet_vapour"] - vapour.inflow),
-        imbalance=max(float(found[f"{name}_imbalance"].max()) for name in ("heat", "vapour", "liquid")),
+        time=columns["time"],
+        water=columns["evaporated_mass"] / water,
+        temperature=columns["mean_temperature"],
+        outlet=columns["outlet_vapour"],
+        rate=np.diff(gone) / np.diff(np.append(0.0, columns["time"])),
+        by_air=area * np.interp(columns["time"], *_ramp(described).T) * (columns["outlet_vapour"] - vapour.inflow),
+        imbalance=max(float(columns[f"{name}_imbalance"].max()) for name in ("heat", "vapour", "liquid")),
     )
     return result, balance(described, water, capacity)
 
@@ -130,16 +130,16 @@ def drying(described: Case) -> tuple[Drying, Balance]:
 # ---------------------------------------------------------------- figure of the drying bed
 
 
-def figure(found: Drying, balance: Balance, path: Path) -> None:
+def figure(drying: Drying, balance: Balance, path: Path) -> None:
     """Temperature, water and rate of a run, with what the balance says."""
     drawn, (left, right) = panels(2, width=9.0, height=3.8)
-    left.plot(found.time, found.temperature - 273.15, color=BLUE, label="mean of the seeds")
+    left.plot(drying.time, drying.temperature - 273.15, color=BLUE, label="mean of the seeds")
     left.axhline(balance.temperature - 273.15, color=GREY, ls="--", label="balance")
     left.axvline(balance.end, color=GREY, lw=1.0, ls=":", label="end by the balance")
     label(left, "time", "s", "temperature", "°C")
     legend(left, loc="upper left")
-    right.plot(found.time, 1e6 * found.rate, color=BLUE, label="from the seeds")
-    right.plot(found.time, 1e6 * found.by_air, color=ORANGE, label="by the air that leaves")
+    right.plot(drying.time, 1e6 * drying.rate, color=BLUE, label="from the seeds")
+    right.plot(drying.time, 1e6 * drying.by_air, color=ORANGE, label="by the air that leaves")
     right.axhline(1e6 * balance.rate, color=GREY, ls="--", label="balance")
     right.axvline(balance.end, color=GREY, lw=1.0, ls=":")
     label(right, "time", "s", "rate of evaporation", "mg/s")

@@ -68,12 +68,12 @@ FASTEST = 1.0
 def figure(run: RunData, case: Case, path: Path) -> None:
     """Beads behind the middle plane, coloured by speed, between the walls; and the removed mass against time."""
     drawn, axes = blank(1, len(TIMES) + 1, width=11.0, height=4.2, gridspec_kw={"width_ratios": [1, 1, 1, 1.5]})
-    for each, time in zip(axes, TIMES):
-        colours = _beads(each, run, case, int(np.abs(run.times - time).argmin()))
-        _walls(each, case, time)
-        label(each, "x", "mm", "z", "mm", f"t = {time:g} s")
-        if each is not axes[0]:
-            each.set_ylabel("")
+    for panel, time in zip(axes, TIMES):
+        colours = _beads(panel, run, case, int(np.abs(run.times - time).argmin()))
+        _walls(panel, case, time)
+        label(panel, "x", "mm", "z", "mm", f"t = {time:g} s")
+        if panel is not axes[0]:
+            panel.set_ylabel("")
     drawn.colorbar(colours, ax=list(axes[: len(TIMES)]), label="speed [m/s]", shrink=0.8, pad=0.02)
     history, law = run.history, beverloo(case)
     axes[-1].plot(history["time"], history["removed_mass"], color=BLUE, label="run")

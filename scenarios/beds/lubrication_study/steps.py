@@ -108,16 +108,16 @@ def table(home: Path) -> list[Row]:
         ]  # fmt: skip
         pairs = [(longer, shorter) for longer, shorter in sides if longer and shorter]
         if pairs:
-            rows += [_row(comparison, what, limit, pairs) for what, limit in comparison.limits.items()]
+            rows += [_row(comparison, measure, limit, pairs) for measure, limit in comparison.limits.items()]
     return rows
 
 
-def _row(comparison: Comparison, what: str, limit: float, pairs: list[tuple[Outcome, Outcome]]) -> Row:
+def _row(comparison: Comparison, measure: str, limit: float, pairs: list[tuple[Outcome, Outcome]]) -> Row:
     """Ratio of the means; the limit is no less than some standard errors of the difference seed by seed."""
-    longer, shorter = (np.array([getattr(each, what) for each in side]) for side in zip(*pairs))
+    longer, shorter = (np.array([getattr(outcome, measure) for outcome in side]) for side in zip(*pairs))
     error = np.nan if len(pairs) < 2 else np.std(longer - shorter, ddof=1) / np.sqrt(len(pairs)) / shorter.mean()
     return Row(
-        f"{comparison.setting.spheres}, {comparison.setting.modulus:.0e} Pa: {NAMES[what]}, {comparison.words}",
+        f"{comparison.setting.spheres}, {comparison.setting.modulus:.0e} Pa: {NAMES[measure]}, {comparison.words}",
         float(longer.mean() / shorter.mean()), 1.0, float(np.fmax(limit, comparison.errors * error)),
         note=f"{longer.mean():.4g} and {shorter.mean():.4g} in SI units; standard error of the paired difference "
         f"{error:.2g} over {len(pairs)} seeds",

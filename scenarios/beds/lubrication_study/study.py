@@ -67,8 +67,8 @@ class Setting(NamedTuple):
 
 
 SETTINGS = [
-    *(Setting(*each) for each in itertools.product(SPHERES, VISCOSITIES, MODULI)),
-    *(Setting(*each) for each in itertools.product(SPHERES, AGITATED, MODULI[:1], ("none", "free_spheres"))),
+    *(Setting(*values) for values in itertools.product(SPHERES, VISCOSITIES, MODULI)),
+    *(Setting(*values) for values in itertools.product(SPHERES, AGITATED, MODULI[:1], ("none", "free_spheres"))),
 ]
 
 
@@ -117,18 +117,18 @@ def folder_of(home: Path, setting: Setting, seed: int) -> Path:
 def run_beds(home: Path, progress: Progress, seeds: Sequence[int] = SEEDS) -> None:
     """Run all beds: the softer contacts first, and seed by seed, so that partial results are balanced."""
     for modulus, seed in itertools.product(MODULI, seeds):
-        for setting in (each for each in SETTINGS if each.modulus == modulus):
+        for setting in (other for other in SETTINGS if other.modulus == modulus):
             finished(bed(setting, seed), home, folder_of(home, setting, seed).name, progress, {})
 
 
 def outcomes(home: Path) -> dict[Setting, list[Outcome]]:
     """Results of the finished runs."""
-    found: dict[Setting, list[Outcome]] = {}
+    of_settings: dict[Setting, list[Outcome]] = {}
     for setting, seed in itertools.product(SETTINGS, SEEDS):
         folder = folder_of(home, setting, seed)
         if (folder / "run.json").exists() and (run := open_run(folder)).status == "finished":
-            found.setdefault(setting, []).append(outcome(run, bed(setting, seed)))
-    return found
+            of_settings.setdefault(setting, []).append(outcome(run, bed(setting, seed)))
+    return of_settings
 
 
 def outcome(run: RunData, case: Case) -> Outcome:
@@ -174,8 +174,8 @@ def meetings(rows: Mapping[str, Array], reach: float) -> float:
     return float(rows["weight"][between].sum() - rows["weight"][between][order][1:][again].sum())
 
 
-def mean(beds: list[Outcome], what: str) -> Mean:
+def mean(beds: list[Outcome], measure: str) -> Mean:
     """Mean of a quantity over the seeds; the standard error needs at least two."""
-    values = np.array([getattr(each, what) for each in beds])
+    values = np.array([getattr(bed, measure) for bed in beds])
     error = values.std(axis=0, ddof=1) / np.sqrt(len(beds)) if len(beds) > 1 else np.full_like(values[0], np.nan)
     return Mean(values.mean(axis=0), error, len(beds))

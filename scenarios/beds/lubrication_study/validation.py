@@ -33,34 +33,34 @@ def study(folder: Path, progress: Progress) -> list[Row]:
     """Run the missing beds, draw the figures, and return the table."""
     home = folder / "runs"
     run_beds(home, progress)
-    found = outcomes(home)
-    measures(found, folder / "measures.png")
-    profiles(found, folder / "profiles.png")
+    of_settings = outcomes(home)
+    measures(of_settings, folder / "measures.png")
+    profiles(of_settings, folder / "profiles.png")
     regimes(home, folder / "regimes.png")
-    return rows(found)
+    return rows(of_settings)
 
 
-def rows(found: dict[Setting, list[Outcome]]) -> list[Row]:
+def rows(of_settings: dict[Setting, list[Outcome]]) -> list[Row]:
     """Results of every bed with errors, then the change with the contact stiffness."""
     table = []
     for setting in SETTINGS:
-        if setting.modulus == MODULI[0] and setting in found:
-            table += _of_bed(setting, found[setting])
+        if setting.modulus == MODULI[0] and setting in of_settings:
+            table += _of_bed(setting, of_settings[setting])
     for setting in SETTINGS:
         softer = setting._replace(modulus=MODULI[0])
-        if setting.modulus != MODULI[0] and setting in found and softer in found:
-            ratio = mean(found[setting], "bed_height").value / mean(found[softer], "bed_height").value
+        if setting.modulus != MODULI[0] and setting in of_settings and softer in of_settings:
+            ratio = mean(of_settings[setting], "bed_height").value / mean(of_settings[softer], "bed_height").value
             table.append(Row(f"{_named(setting)}: bed height, stiffer over softer contacts", ratio, 1.0, STIFFER))
     return table
 
 
 def _of_bed(setting: Setting, beds: list[Outcome]) -> list[Row]:
-    made = []
-    for what, (name, unit, factor) in MEASURES.items():
-        value, error, seeds = mean(beds, what)
+    table = []
+    for measure, (name, unit, factor) in MEASURES.items():
+        value, error, seeds = mean(beds, measure)
         note = f"standard error {factor * error:.2g} over {seeds} seeds" if seeds > 1 else "one seed"
-        made.append(Row(f"{_named(setting)}: {name}", factor * value, unit=unit, note=note))
-    return made
+        table.append(Row(f"{_named(setting)}: {name}", factor * value, unit=unit, note=note))
+    return table
 
 
 def _named(setting: Setting) -> str:
@@ -85,43 +85,43 @@ MOST = 8.0
 Found = dict[Setting, list[Outcome]]
 
 
-def measures(found: Found, path: Path) -> None:
+def measures(of_settings: Found, path: Path) -> None:
     """Means with errors for every kind of sphere and both viscosities; stiffer contacts as hollow points."""
     figure, axes = blank(1, len(MEASURES), width=11.0, height=3.9)
-    for each, (what, (name, unit, factor)) in zip(axes, MEASURES.items()):
+    for panel, (measure, (name, unit, factor)) in zip(axes, MEASURES.items()):
         for place, viscosity in enumerate(VISCOSITIES):
             for number, spheres in enumerate(SPHERES):
                 for shift, modulus in zip((-0.09, 0.09), MODULI):
-                    beds = found.get(Setting(spheres, viscosity, modulus))
+                    beds = of_settings.get(Setting(spheres, viscosity, modulus))
                     if not beds:
                         continue
-                    value, error, _ = mean(beds, what)
+                    value, error, _ = mean(beds, measure)
                     style: Any = {"mfc": "white"} if modulus != MODULI[0] else {}
                     named = spheres if place == 0 and modulus == MODULI[0] else None
-                    each.errorbar(
+                    panel.errorbar(
                         5 * place + number + shift, factor * value, factor * error, fmt="o", capsize=3,
                         color=COLOURS[spheres], label=named, **style,
                     )  # fmt: skip
-        label(each, "viscosity", "mPa s", name, unit)
-        each.set_xticks([1.5, 6.5], [f"{1e3 * viscosity:g}" for viscosity in VISCOSITIES])
-        each.set_ylim(0.0, 1.08 * each.get_ylim()[1])
-        each.grid(False, axis="x")
+        label(panel, "viscosity", "mPa s", name, unit)
+        panel.set_xticks([1.5, 6.5], [f"{1e3 * viscosity:g}" for viscosity in VISCOSITIES])
+        panel.set_ylim(0.0, 1.08 * panel.get_ylim()[1])
+        panel.grid(False, axis="x")
     legend(axes[0], loc="lower left", ncols=2)
     save(figure, path)
 
 
-def profiles(found: Found, path: Path) -> None:
+def profiles(of_settings: Found, path: Path) -> None:
     """Voidage against height, with the error of the mean over seeds."""
     figure, axes = blank(1, len(VISCOSITIES), width=8.0, height=4.2, sharey=True)
-    for each, viscosity in zip(axes, VISCOSITIES):
+    for panel, viscosity in zip(axes, VISCOSITIES):
         for spheres in SPHERES:
-            beds = found.get(Setting(spheres, viscosity, MODULI[0]))
+            beds = of_settings.get(Setting(spheres, viscosity, MODULI[0]))
             if not beds:
                 continue
             value, error, _ = mean(beds, "voidage")
             height = 1e3 * beds[0].level
-            each.errorbar(value, height, xerr=error, color=COLOURS[spheres], label=spheres, capsize=2, linewidth=1.2)
-        label(each, "voidage", "-", "height", "mm", f"{1e3 * viscosity:g} mPa s")
+            panel.errorbar(value, height, xerr=error, color=COLOURS[spheres], label=spheres, capsize=2, linewidth=1.2)
+        label(panel, "voidage", "-", "height", "mm", f"{1e3 * viscosity:g} mPa s")
     axes[1].set_ylabel("")
     legend(axes[0], loc="upper left")
     save(figure, path)
@@ -142,12 +142,12 @@ def regimes(home: Path, path: Path) -> None:
             late = run.collisions["end"] >= run.times[-1] / 3.0
             for name, column in run.collisions.items():
                 rows.setdefault(name, []).append(column[late])
-        found = regime_map({name: np.concatenate(each) for name, each in rows.items()})
-        shades = draw_regimes(axes[place], found, f"{spheres}, {1e3 * viscosity:g} mPa s", most=MOST)
-    for place, each in enumerate(axes):
-        each.set(xlim=(0.03, 300.0), ylim=(1e-5, 100.0))
-        each.set_ylabel("" if place % len(kinds) else "elastohydrodynamic gap\nover roughness  [-]")
+        map_of_regimes = regime_map({name: np.concatenate(columns) for name, columns in rows.items()})
+        shades = draw_regimes(axes[place], map_of_regimes, f"{spheres}, {1e3 * viscosity:g} mPa s", most=MOST)
+    for place, panel in enumerate(axes):
+        panel.set(xlim=(0.03, 300.0), ylim=(1e-5, 100.0))
+        panel.set_ylabel("" if place % len(kinds) else "elastohydrodynamic gap\nover roughness  [-]")
         if place < len(kinds):
-            each.set_xlabel("")
+            panel.set_xlabel("")
     figure.colorbar(shades, ax=axes.tolist(), label="density of collisions  [1/decade2]", shrink=0.8)
     save(figure, path)

@@ -77,7 +77,7 @@ def heating(described: Case, times: Sequence[float]) -> list[Heating]:
     """Heat the bed of a case; temperatures of its layers of cells at some times [s]."""
     simulation, keys = Simulation(described), Heat.of(described)
     assert keys is not None
-    fluid, heat, found = simulation.fluid, simulation.feature(HeatExchange), []
+    fluid, heat, profiles = simulation.fluid, simulation.feature(HeatExchange), []
     assert heat.cells is not None
     start, inlet, speed = keys.particle_temperature, keys.sides_of(described).inflow, described.bed.inlet_velocity
     layers, edge = fluid.grid.shape[0], fluid.grid.spacing[2]
@@ -95,8 +95,8 @@ def heating(described: Case, times: Sequence[float]) -> list[Heating]:
         exact = [schumann(units * x, conductance / capacity * (time - voidage * x / speed)) for x in height]
         exact_solids, exact_fluid = np.transpose(exact)
         scaled = (solids - start) / (inlet - start), (heat.cells.value.mean(axis=(1, 2)) - start) / (inlet - start)
-        found.append(Heating(time, height, *scaled, exact_solids, exact_fluid))
-    return found
+        profiles.append(Heating(time, height, *scaled, exact_solids, exact_fluid))
+    return profiles
 
 
 # ---------------------------------------------------------------- figure of the heated bed
@@ -108,15 +108,23 @@ TIMES = (0.2, 0.4, 0.6)
 def figure(path: Path) -> None:
     """Temperatures of the beads against height, with the exact ones."""
     drawn, axes = panels(width=6.5, height=4.0)
-    for number, each in enumerate(heating(case(), TIMES)):
+    for number, profile in enumerate(heating(case(), TIMES)):
         first = number == 0
-        axes.plot(1e3 * each.height, each.exact_solids, color=GREY, label="exact, beads" if first else None)
-        axes.plot(1e3 * each.height, each.exact_fluid, color=GREY, ls="--", label="exact, water" if first else None)
-        axes.plot(1e3 * each.height, each.solids, "o", color=BLUE, ms=4, label="run, beads" if first else None)
+        axes.plot(1e3 * profile.height, profile.exact_solids, color=GREY, label="exact, beads" if first else None)
         axes.plot(
-            1e3 * each.height, each.fluid, "o", color=BLUE, mfc="none", ms=4, label="run, water" if first else None
+            1e3 * profile.height, profile.exact_fluid, color=GREY, ls="--", label="exact, water" if first else None
         )
-        print(f"t = {each.time} s: largest {each.error:.4f}, mean {each.mean_error:.4f}")
+        axes.plot(1e3 * profile.height, profile.solids, "o", color=BLUE, ms=4, label="run, beads" if first else None)
+        axes.plot(
+            1e3 * profile.height,
+            profile.fluid,
+            "o",
+            color=BLUE,
+            mfc="none",
+            ms=4,
+            label="run, water" if first else None,
+        )
+        print(f"t = {profile.time} s: largest {profile.error:.4f}, mean {profile.mean_error:.4f}")
     label(axes, "height", "mm", "temperature, 0 at the start, 1 at the inlet", "-")
     legend(axes, loc="upper right")
     save(drawn, path)

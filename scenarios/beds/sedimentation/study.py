@@ -119,19 +119,19 @@ def between_walls(solid_fraction: float, *, fall: float = 0.45) -> Settling:
 
 def exponent(settlings: Sequence[Settling]) -> tuple[float, float]:
     """Exponent n and velocity at no solids [m/s] of the power law through settling velocities, by least squares."""
-    voidage = np.log([1.0 - each.solid_fraction for each in settlings])
-    slope, intercept = np.polyfit(voidage, np.log([each.velocity for each in settlings]), 1)
+    voidage = np.log([1.0 - settling.solid_fraction for settling in settlings])
+    slope, intercept = np.polyfit(voidage, np.log([settling.velocity for settling in settlings]), 1)
     return float(slope), float(np.exp(intercept))
 
 
 # ---------------------------------------------------------------- figure of hindered settling
 
 
-def figure(found: Sequence[Settling], path: Path) -> None:
+def figure(settlings: Sequence[Settling], path: Path) -> None:
     """Velocities of suspensions over that of one sphere, on logarithmic axes, and two power laws."""
     case = vessel()
-    terminal = found[0].terminal
-    power, alone = exponent(found)
+    terminal = settlings[0].terminal
+    power, alone = exponent(settlings)
     reynolds = case.required_fluid.density * terminal * case.bed.diameter / case.required_fluid.viscosity
     published = exponent_richardson_zaki(reynolds, 0.0)
     drawn, axes = panels(width=6.5, height=4.2)
@@ -140,7 +140,7 @@ def figure(found: Sequence[Settling], path: Path) -> None:
         voidage, alone / terminal * voidage**power, color=BLUE, label=f"power law through the points, n = {power:.3f}"
     )
     axes.plot(voidage, voidage**published, color=GREY, ls="--", label=f"Richardson and Zaki, n = {published:.3f}")
-    points = [(1.0 - each.solid_fraction, each.velocity / terminal) for each in found]
+    points = [(1.0 - settling.solid_fraction, settling.velocity / terminal) for settling in settlings]
     axes.plot(*np.transpose(points), "o", color=BLUE, ms=7, label="runs in a periodic box")
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -153,5 +153,5 @@ def figure(found: Sequence[Settling], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    suspensions = [in_periodic_box(each, distance=24.0) for each in SOLID_FRACTIONS]
+    suspensions = [in_periodic_box(share, distance=24.0) for share in SOLID_FRACTIONS]
     figure(suspensions, Path(sys.argv[1] if len(sys.argv) > 1 else "sedimentation.png"))

@@ -34,7 +34,7 @@ def mixture(velocity: float = VELOCITIES[0]) -> Case:
 def thresholds(case: Case) -> dict[str, float]:
     """Velocity at which the layers of the two species are equally dense, by each published law of expansion [m/s]."""
     alone = [expansion_exponents(_alone(case, name)) for name in case.species]
-    densities = [case.material_of(each).density for each in case.species.values()]
+    densities = [case.material_of(species).density for species in case.species.values()]
     first, second = densities
     return {
         law: inversion_velocity(
@@ -52,11 +52,11 @@ def balance(case: Case) -> float:
     second = list(case.species)[1]
 
     def force(velocity: float) -> float:
-        known = estimate_bed(case.with_(**{"bed.inlet_velocity": velocity}))
-        return net_downward_forces(case, velocity, known.voidage)[second]
+        estimate = estimate_bed(case.with_(**{"bed.inlet_velocity": velocity}))
+        return net_downward_forces(case, velocity, estimate.voidage)[second]
 
-    known = estimate_bed(case)
-    low, high = 1.05 * known.onset, 0.8 * known.terminal
+    estimate = estimate_bed(case)
+    low, high = 1.05 * estimate.onset, 0.8 * estimate.terminal
     return float(brentq(force, low, high, xtol=1e-6)) if force(low) * force(high) < 0.0 else math.nan
 
 

@@ -236,10 +236,10 @@ def figure(path: Path) -> None:
         (case.laws.history, BLUE, "with history force"),
         ("none", ORANGE, "without history force"),
     ):
-        each = case.with_(**{"laws.history": history})
-        times, speeds = release(each)
+        changed = case.with_(**{"laws.history": history})
+        times, speeds = release(changed)
         axes.plot(1e3 * times, 1e3 * speeds, color=colour, label=text)
-        axes.plot(1e3 * times, 1e3 * equation_of_motion(each, times), color="black", ls=":", lw=1.4)
+        axes.plot(1e3 * times, 1e3 * equation_of_motion(changed, times), color="black", ls=":", lw=1.4)
     axes.plot([], [], color="black", ls=":", lw=1.4, label="equation of motion")
     exponential = 1e3 * terminal * (1.0 - np.exp(-3.0 * times / lasting))
     axes.plot(1e3 * times, exponential, color=GREY, ls="--", label="fit of Mordant and Pinton (2000)")

@@ -112,4 +112,4 @@ def figure(hot: Path, cold: Path, output: Path) -> None:
 
 
 if __name__ == "__main__":
-    figure(*(Path(each) for each in sys.argv[1:4]))
+    figure(*(Path(path) for path in sys.argv[1:4]))

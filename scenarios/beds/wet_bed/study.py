@@ -92,18 +92,18 @@ def bench(threads: int = 1, measured: tuple[float, float, float] = MEASURED) -> 
     use_threads(threads)
     begin, end, piece = measured
     beds = {name: Simulation(bed(name).with_(**{"run.particle_step": 1.2e-5})) for name in ("dry", "oil 0.1 %")}
-    for each in beds.values():
-        each.until(begin)
-    before = {name: dict(each.timers.seconds) for name, each in beds.items()}
+    for simulation in beds.values():
+        simulation.until(begin)
+    before = {name: dict(simulation.timers.seconds) for name, simulation in beds.items()}
     spent = dict.fromkeys(beds, 0.0)
     for time in np.arange(begin + piece, end + 0.5 * piece, piece):
-        for name, each in beds.items():
+        for name, simulation in beds.items():
             now = process_time()
-            each.until(float(time))
+            simulation.until(float(time))
             spent[name] += process_time() - now
-    made = {name: _cost(each, before[name], spent[name], end - begin) for name, each in beds.items()}
-    dry, wet = (each["processor [s/s]"] for each in made.values())
-    return {"particles": bed().bed.count, "threads": threads, "beds": made, "wet over dry": wet / dry}
+    costs = {name: _cost(simulation, before[name], spent[name], end - begin) for name, simulation in beds.items()}
+    dry, wet = (cost["processor [s/s]"] for cost in costs.values())
+    return {"particles": bed().bed.count, "threads": threads, "beds": costs, "wet over dry": wet / dry}
 
 
 def _cost(run: Simulation, before: dict[str, float], spent: float, time: float) -> dict[str, Any]:
@@ -122,8 +122,8 @@ def _cost(run: Simulation, before: dict[str, float], spent: float, time: float) 
 def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """A result of `bench` as lines of a table."""
     yield "wet bubbling bed", f"{result['particles']} spheres, {result['threads']} thread(s)"
-    for name, each in result["beds"].items():
-        yield name, f"{each['processor [s/s]']:.0f} s of processor per simulated second"
-        yield "", ", ".join(f"{part} {share:.0%}" for part, share in each["shares"].items())
-        yield "", f"{each['listed pairs']} listed pairs, {each['contacts']} contacts, {each['bridges']} bridges"
+    for name, cost in result["beds"].items():
+        yield name, f"{cost['processor [s/s]']:.0f} s of processor per simulated second"
+        yield "", ", ".join(f"{part} {share:.0%}" for part, share in cost["shares"].items())
+        yield "", f"{cost['listed pairs']} listed pairs, {cost['contacts']} contacts, {cost['bridges']} bridges"
     yield "wet over dry", f"{result['wet over dry']:.2f}"

@@ -88,7 +88,7 @@ def state(name: str) -> Case:
     title = f"Mueller's bed, {name}"
     if oil is None:
         return case.with_(title=title)
-    rough = {f"material.{each}.roughness": 1e-6 for each in case.material}
+    rough = {f"material.{material}.roughness": 1e-6 for material in case.material}
     liquid = {"viscosity": VISCOSITY, "surface_tension": SURFACE_TENSION}
     return case.with_(
         **rough, title=title, liquid=liquid | {"contact_angle": oil.contact_angle, "liquid_fraction": oil.share}
@@ -164,7 +164,7 @@ def table(folder: Path) -> list[Row]:
 
     States are compared over the same times, but a bed that comes to rest only as long as it moves.
     """
-    found: dict[str, list[Means]] = {}
+    by_state: dict[str, list[Means]] = {}
     rows_of_states: list[Row] = []
     for name, ends in windows(folder).items():
         runs = {seed: open_run(folder / f"{name}_{seed}") for seed in ends}
@@ -176,19 +176,19 @@ def table(folder: Path) -> list[Row]:
             if math.isfinite(time):
                 rows_of_states.append(Row(f"{name}: packing {seed} comes to rest after", time, unit="s"))
         if moving:
-            found[name] = [means(runs[seed], SETTLED, end) for seed, end in moving.items()]
-            rows_of_states += rows(name, found[name])
+            by_state[name] = [means(runs[seed], SETTLED, end) for seed, end in moving.items()]
+            rows_of_states += rows(name, by_state[name])
     ramps = {name: falling(name, folder) for name in RAMPS if is_there(folder / ramp_folder(name), RAMP[-1][0])}
-    if "dry" in found and len(found) > 1:
-        ratios = {quantity: [over_dry(found, name, quantity) for name in found] for quantity, *_ in QUANTITIES}
-        draw(folder / "wet-beds.png", [pull_over_weight(each) for each in found], ratios, ramps)
+    if "dry" in by_state and len(by_state) > 1:
+        ratios = {quantity: [over_dry(by_state, name, quantity) for name in by_state] for quantity, *_ in QUANTITIES}
+        draw(folder / "wet-beds.png", [pull_over_weight(state) for state in by_state], ratios, ramps)
     return [
         *rows_of_states,
         *(
             Row(f"{name}: minimum fluidisation on the way down", ramp.onset, unit="m/s", note=ramp.note)
             for name, ramp in ramps.items()
         ),
-        *directions(found, {name: ramp.onset for name, ramp in ramps.items()}),
+        *directions(by_state, {name: ramp.onset for name, ramp in ramps.items()}),
     ]
 
 
@@ -205,8 +205,8 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
 
 def rest(run: RunData, case: Case) -> float:
     """Time from which on a wet bed is not fluidised [s]; infinite if it is at the end."""
-    found = defluidisation_of(run, case)
-    return math.inf if found is None else found.time
+    loss = defluidisation_of(run, case)
+    return math.inf if loss is None else loss.time
 
 
 def while_moving(ends: Mapping[int, float], rests: Mapping[int, float]) -> dict[int, float]:
@@ -232,35 +232,35 @@ def reached(home: Path) -> float:
 
 def rows(name: str, runs: Sequence[Means]) -> list[Row]:
     """Means over the packings, with the standard error of their mean."""
-    made = []
+    table = []
     for quantity, unit in UNITS.items():
         mean, error = over_packings(runs, quantity)
-        made.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
-    return made
+        table.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
+    return table
 
 
-def directions(found: dict[str, list[Means]], onsets: dict[str, float]) -> list[Row]:
+def directions(by_state: dict[str, list[Means]], onsets: dict[str, float]) -> list[Row]:
     """Ratios to the dry bed, as logarithms: above 0 where they should rise, with their standard errors."""
-    made = []
-    for name in (each for each in found if each != "dry" and "dry" in found):
+    table = []
+    for name in (state for state in by_state if state != "dry" and "dry" in by_state):
         for quantity, sign in EXPECTED.items():
-            ratio, error = over_dry(found, name, quantity)
+            ratio, error = over_dry(by_state, name, quantity)
             word = "larger" if sign > 0.0 else "smaller"
-            made.append(
+            table.append(
                 Row(
                     f"{name}: {quantity.replace('_', ' ')} {word} than dry, logarithm of the ratio",
                     sign * math.log(ratio),
                     note=f"standard error {error / ratio:.2g}; experiments report above 0",
                 )
             )
-    for name in (each for each in onsets if each != "dry" and "dry" in onsets):
-        made.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onsets[name] / onsets["dry"]))
-    return made
+    for name in (state for state in onsets if state != "dry" and "dry" in onsets):
+        table.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onsets[name] / onsets["dry"]))
+    return table
 
 
-def over_dry(found: Mapping[str, Sequence[Means]], name: str, quantity: str) -> Estimate:
+def over_dry(by_state: Mapping[str, Sequence[Means]], name: str, quantity: str) -> Estimate:
     """Mean of a quantity in a state over that in the dry bed; 1 without error for the dry bed itself."""
-    wet, dry = (over_packings(found[each], quantity) for each in (name, "dry"))
+    wet, dry = (over_packings(by_state[state], quantity) for state in (name, "dry"))
     ratio = wet[0] / dry[0]
     return ratio, 0.0 if name == "dry" else ratio * math.hypot(wet[1] / wet[0], dry[1] / dry[0])
 
@@ -298,8 +298,8 @@ def means(run: RunData, begin: float, end: float = math.inf) -> Means:
 
 def _mean(values: np.ndarray) -> Estimate:
     """Mean and its error of a correlated series."""
-    found = block_average(values)
-    return found.mean, found.error
+    average = block_average(values)
+    return average.mean, average.error
 
 
 def _deviation(values: np.ndarray) -> Estimate:
@@ -332,7 +332,7 @@ def falling(name: str, folder: Path) -> Ramp:
     """The part of a ramp in which the velocity falls, and where the pressure drop of the packed bed is the weight."""
     run, case = open_run(folder / ramp_folder(name)), state(name).with_(**{"bed.inlet_velocity": RAMP})
     falls = run.history["time"] > RAMP[-2][0]
-    time, drop = (run.history[each][falls] for each in ("time", "pressure_drop"))
+    time, drop = (run.history[column][falls] for column in ("time", "pressure_drop"))
     velocity = np.interp(time, *np.array(RAMP).T)
     share = drop * case.column.floor_area / buoyant_weight(case)
     try:
@@ -389,7 +389,7 @@ def draw(
     for style, (name, ramp) in zip(line_styles(len(ramps)), ramps.items()):
         width = max(round(SMOOTHED / float(np.median(np.diff(ramp.time)))), 1)
         kernel = np.full(width, 1.0 / width)
-        velocity, share = (np.convolve(each, kernel, "valid") for each in (ramp.velocity, ramp.share))
+        velocity, share = (np.convolve(series, kernel, "valid") for series in (ramp.velocity, ramp.share))
         right.plot(velocity, share, label=name, **style)
         right.plot([ramp.onset], [1.0], "o", color=style["color"], markersize=7.0)
     label(right, "gas velocity", "m/s", "pressure drop over weight", "-", "While the velocity falls")

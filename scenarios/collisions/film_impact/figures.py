@@ -94,7 +94,7 @@ def draw_energies(path: Path, pairs: dict[str, tuple[FilmImpact, FilmImpact]]) -
     """Kinetic energy of the liquid over time from its highest value, with smoothed particles and on the grid."""
     figure, axes = panels(2, width=11.0, height=4.6, sharey=True)
     for regime, axis in enumerate(axes, 1):
-        chosen = {name: each for name, each in pairs.items() if each[1].regime == regime}
+        chosen = {name: pair for name, pair in pairs.items() if pair[1].regime == regime}
         for (name, (smoothed, on_grid)), colour in zip(chosen.items(), (BLUE, ORANGE, GREEN)):
             for result, line, shown in ((on_grid, "-", name), (smoothed, "--", None)):
                 time, energy = result.history["time"], result.history["liquid_kinetic"]
@@ -114,11 +114,11 @@ def draw_restitution(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
     figure, axis = panels(width=8.6, height=5.2)
     for (case, results), colour in zip(cases.items(), shades(len(cases))):
         diameter, liquid, _ = case
-        stokes = np.array([each.stokes for each in results])
+        stokes = np.array([result.stokes for result in results])
         name = f"{diameter * 1e3:g} mm, {liquid}, $\\gamma$ = {results[0].film_ratio:.3f}"
-        axis.plot(stokes, [each.restitution for each in results], "o", color=colour, label=name)
+        axis.plot(stokes, [result.restitution for result in results], "o", color=colour, label=name)
         line = np.geomspace(stokes[0], stokes[-1], 60)
-        axis.plot(line, [singh(each, results[0].film_ratio) for each in line], color=colour, lw=1.2)
+        axis.plot(line, [singh(number, results[0].film_ratio) for number in line], color=colour, lw=1.2)
     axis.set_xscale("log")
     label(axis, "Stokes number", "-", "restitution", "-", "Resolved (points) and the fit of Singh et al. (lines)")
     legend(axis, loc="lower right")
@@ -129,9 +129,11 @@ def draw_tension(path: Path, cases: dict[Case, dict[float | None, list[FilmImpac
     """Restitution without surface tension and with it, at each contact angle."""
     figure, axes = panels(len(cases), width=11.0, height=4.4, sharey=True)
     for axis, ((diameter, liquid, _), results) in zip(axes, cases.items()):
-        for (angle, each), (colour, mark) in zip(results.items(), ((GREY, "o-"), (BLUE, "s--"), (ORANGE, "^--"))):
+        for (angle, of_angle), (colour, mark) in zip(results.items(), ((GREY, "o-"), (BLUE, "s--"), (ORANGE, "^--"))):
             name = "no surface tension" if angle is None else f"surface tension, {angle:g} degrees"
-            axis.plot([-r.p1.velocity for r in each], [r.restitution for r in each], mark, color=colour, label=name)
+            axis.plot(
+                [-r.p1.velocity for r in of_angle], [r.restitution for r in of_angle], mark, color=colour, label=name
+            )
         label(axis, "velocity", "m/s", "restitution", "-", f"{diameter * 1e3:g} mm, {liquid}")
     for axis in axes[1:]:
         axis.set_ylabel("")
@@ -145,11 +147,11 @@ def draw_laws(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
     figure, axes = panels(len(chosen), width=11.0, height=4.6, sharey=True)
     for axis, case in zip(axes, chosen):
         diameter, liquid, film = case
-        speeds = np.array([-each.p1.velocity for each in cases[case]])
+        speeds = np.array([-impact.p1.velocity for impact in cases[case]])
         laws = [laws_of(diameter, LIQUIDS[liquid], film, float(speed)) for speed in speeds]
         for name, (colour, line) in STYLES.items():
-            axis.plot(speeds, [each[name] for each in laws], line, color=colour, label=name)
-        axis.plot(speeds, [each.restitution for each in cases[case]], "o", color="#222222", label="resolved")
+            axis.plot(speeds, [law[name] for law in laws], line, color=colour, label=name)
+        axis.plot(speeds, [impact.restitution for impact in cases[case]], "o", color="#222222", label="resolved")
         label(axis, "velocity", "m/s", "restitution", "-", f"{diameter * 1e3:g} mm, {liquid}")
         axis.set_ylim(0.4, 1.0)
     for axis in axes[1:]:

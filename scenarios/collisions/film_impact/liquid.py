@@ -81,12 +81,12 @@ def to_faces(particles, volume, dx, u, w, known_u, known_w):
 
 
 @serial
-def deposit(particles, volume, dx, held):
+def deposit(particles, volume, dx, volumes):
     """Liquid around each cell's centre, weighted with a tent of two cells [m3]."""
-    unused = np.zeros_like(held)
-    held[:] = 0.0
+    unused = np.zeros_like(volumes)
+    volumes[:] = 0.0
     for n in range(len(particles)):
-        spread(held, unused, particles[n, 0] / dx - 0.5, particles[n, 1] / dx - 0.5, volume[n], 0.0)
+        spread(volumes, unused, particles[n, 0] / dx - 0.5, particles[n, 1] / dx - 0.5, volume[n], 0.0)
 
 
 @serial
@@ -106,9 +106,9 @@ def openness(open_cell, shares):
 
 def full(grid: Grid, per_side: int) -> np.ndarray:
     """What :func:`deposit` gives where there is liquid everywhere [m3]."""
-    held = np.zeros(grid.open_cell.shape)
-    deposit(*seed(grid, grid.vertical * grid.dx, per_side), grid.dx, held)
-    return held
+    volumes = np.zeros(grid.open_cell.shape)
+    deposit(*seed(grid, grid.vertical * grid.dx, per_side), grid.dx, volumes)
+    return volumes
 
 
 def filled_share(grid: Grid, particles: np.ndarray, volume: np.ndarray, whole: np.ndarray) -> np.ndarray:
@@ -116,11 +116,11 @@ def filled_share(grid: Grid, particles: np.ndarray, volume: np.ndarray, whole: n
 
     whole  from :func:`full`
     """
-    held, shares = np.zeros_like(whole), np.zeros_like(whole)
-    deposit(particles, volume, grid.dx, held)
+    volumes, shares = np.zeros_like(whole), np.zeros_like(whole)
+    deposit(particles, volume, grid.dx, volumes)
     openness(grid.open_cell, shares)
     room = np.where((grid.open_cell > 0.0) & (shares > 0.0), whole * shares, np.inf)
-    return np.asarray(held / room)
+    return np.asarray(volumes / room)
 
 
 def in_columns(grid: Grid, particles: np.ndarray, volume: np.ndarray) -> np.ndarray:
@@ -171,34 +171,34 @@ freely."""
 
 
 @serial
-def carry(dt, dx, along, values, known, last, last_known):
+def carry(dt, dx, along, values, is_set, last, last_known):
     """Velocities of faces without particles from the step before, carried along the radius with the speed `along`."""
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
-            if not known[i, j] and last_known[i, j]:
+            if not is_set[i, j] and last_known[i, j]:
                 values[i, j] = sample(last, i - dt * along[i, min(j, along.shape[1] - 1)] / dx, float(j))
-                known[i, j] = True
+                is_set[i, j] = True
 
 
 @serial
-def extend(values, known, layers):
+def extend(values, is_set, layers):
     """Extend values outwards, layer by layer, by the mean of the neighbours that are known."""
-    known = known.copy()
+    is_set = is_set.copy()
     for _ in range(layers):
-        fresh = known.copy()
+        fresh = is_set.copy()
         for i in range(values.shape[0]):
             for j in range(values.shape[1]):
-                if known[i, j]:
+                if is_set[i, j]:
                     continue
                 total, count = 0.0, 0
                 for k, m in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-                    if 0 <= k < values.shape[0] and 0 <= m < values.shape[1] and known[k, m]:
+                    if 0 <= k < values.shape[0] and 0 <= m < values.shape[1] and is_set[k, m]:
                         total += values[k, m]
                         count += 1
                 if count:
                     values[i, j] = total / count
                     fresh[i, j] = True
-        known[:] = fresh
+        is_set[:] = fresh
 
 
 def cells_to_faces(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -271,8 +271,8 @@ def overfilled(grid: Grid, particles: np.ndarray, volume: np.ndarray) -> float:
     """
     cells = np.stack(np.meshgrid(*(np.arange(length) + 0.5 for length in grid.open_cell.shape), indexing="ij"), axis=-1)
     room = grid.open_cell * (grid.ring * grid.dx)[:, None]
-    held = _tents(particles[:, :2] / grid.dx, volume, grid)
-    return float(np.maximum(held - _tents(cells.reshape(-1, 2), room.ravel(), grid), 0.0).sum() / volume.sum())
+    volumes = _tents(particles[:, :2] / grid.dx, volume, grid)
+    return float(np.maximum(volumes - _tents(cells.reshape(-1, 2), room.ravel(), grid), 0.0).sum() / volume.sum())
 
 
 def _tents(places: np.ndarray, volume: np.ndarray, grid: Grid) -> np.ndarray:

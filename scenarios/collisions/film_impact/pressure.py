@@ -184,8 +184,8 @@ def solve(
         return Solved(pressure, 0.0, 0.0)
     matrix, outflow, projected = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
     edges = Faces(*map(np.zeros_like, flow)) if edges is None else edges
-    given = (number, cells, grid.open, mobility, edges, flow, dt / cells.density)
-    assemble(*given, (matrix, outflow, projected))
+    equation = (number, cells, grid.open, mobility, edges, flow, dt / cells.density)
+    assemble(*equation, (matrix, outflow, projected))
     matrix[0, matrix[0] == 0.0] = 1.0
     share = dt / bead.mass
     if voids is None:
@@ -200,7 +200,7 @@ def solve(
         voids.volume[~liquid] = 0.0
         voids.work -= float(p @ growth) * dt
     bead.force = float(projected @ p)
-    correct(*given, p)
+    correct(*equation, p)
     pressure[liquid] = p
     return Solved(pressure, bead.force, float(grid.ring @ pressure[:, 0]))
 
@@ -257,16 +257,16 @@ def _with_fixed(
     matrix: np.ndarray, outflow: np.ndarray, projected: np.ndarray, velocity: float, share: float, fixed: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Pressure and bead speed with the pressure given in some cells, where `fixed` is not 0."""
-    known = fixed != 0.0
-    if not known.any():
+    is_fixed = fixed != 0.0
+    if not is_fixed.any():
         return coupled(matrix, outflow, projected, velocity, share)
     free = matrix.copy()
-    free[:, known] = 0.0
+    free[:, is_fixed] = 0.0
     for band in range(1, len(matrix)):
-        free[band, :-band][known[band:]] = 0.0
-    free[0, known] = 1.0
+        free[band, :-band][is_fixed[band:]] = 0.0
+    free[0, is_fixed] = 1.0
     both = np.stack([-outflow - _times(matrix, fixed), projected], axis=1)
-    both[known] = np.stack([fixed[known], np.zeros(known.sum())], axis=1)
+    both[is_fixed] = np.stack([fixed[is_fixed], np.zeros(is_fixed.sum())], axis=1)
     at_rest, moving = solve_banded(free, both).T
     speed = float((velocity + share * (projected @ at_rest)) / (1.0 + share * (projected @ moving)))
     return at_rest - speed * moving, speed

@@ -133,23 +133,23 @@ OF_GRID = (
 
 
 @takes(Fall)
-def impact(given: Fall) -> FilmImpact:
+def impact(fall: Fall) -> FilmImpact:
     """Let a bead fall through a liquid film onto a plate.
 
     >>> round(impact(liquid=Liquid(density=1e-3, viscosity=0.0), cells=5, gravity=0.0).restitution, 4)
     0.98
     """
-    liquid, cells = liquid_named(given.liquid, given.viscosity), given.cells or CELLS[given.method]
-    diameter, film, velocity, density = given.diameter, given.film, given.velocity, given.solid.density
+    liquid, cells = liquid_named(fall.liquid, fall.viscosity), fall.cells or CELLS[fall.method]
+    diameter, film, velocity, density = fall.diameter, fall.film, fall.velocity, fall.solid.density
     bead = Bead(0.5 * diameter, density * math.pi / 6.0 * diameter**3, film, -velocity)
-    numbers = given.settings(liquid, cells)
-    of_liquid = (liquid.density, liquid.viscosity, given.solid.restitution, given.gravity, numbers)
+    numbers = fall.settings(liquid, cells)
+    of_liquid = (liquid.density, liquid.viscosity, fall.solid.restitution, fall.gravity, numbers)
     run = (
         SmoothedImpact(bead, film, cells, *of_liquid)
-        if given.method == "isph"
-        else GridImpact(grid_for(diameter, film, cells, given.domain), bead, film, *of_liquid)
+        if fall.method == "isph"
+        else GridImpact(grid_for(diameter, film, cells, fall.domain), bead, film, *of_liquid)
     )
-    return integrate(run, velocity, density, given.progress)
+    return integrate(run, velocity, density, fall.progress)
 
 
 def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> Grid:

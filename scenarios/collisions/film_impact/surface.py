@@ -61,8 +61,8 @@ class Tension:
         share, kappa = np.clip(filled, 0.0, 1.0), np.zeros_like(filled)
         cosines = np.cos(np.array([self.bead, self.plate, self.side]))
         around = np.pad(share, ((0, GHOSTS), (GHOSTS, 0)), mode="edge")
-        known = np.pad(grid.open_cell > 0.0, ((0, GHOSTS), (GHOSTS, 0)), mode="edge")
-        extend(around, known, BESIDE)
+        is_set = np.pad(grid.open_cell > 0.0, ((0, GHOSTS), (GHOSTS, 0)), mode="edge")
+        extend(around, is_set, BESIDE)
         continued = around.copy()
         continue_into_solids(around, continued, radius / grid.dx, gap / grid.dx)
         for _ in range(PASSES):

@@ -84,9 +84,9 @@ def study(folder: Path, progress: Progress) -> list[Row]:
     cases = {case: sweep(VELOCITIES, progress, diameter=case[0], liquid=case[1], film=case[2]) for case in CASES}
     stretched = {case: with_tension(case, progress) for case in (CASES[0], CASES[3], CASES[4])}
     rows += smoothed(pairs) + fit(cases) + conservation(cases) + words(cases) + film_laws(cases) + tension(stretched)
-    histories = {f"{d * 1e3:g}mm_{liquid}_{v:g}": each
-                 for (d, liquid, _), results in cases.items() for v, each in zip(VELOCITIES, results)}  # fmt: skip
-    write_histories(folder / "histories.h5", {name: _columns(each) for name, each in histories.items()})
+    histories = {f"{d * 1e3:g}mm_{liquid}_{v:g}": result
+                 for (d, liquid, _), results in cases.items() for v, result in zip(VELOCITIES, results)}  # fmt: skip
+    write_histories(folder / "histories.h5", {name: _columns(history) for name, history in histories.items()})
     largest = cases[CASES[0]]
     draw_moments(folder / "film_impact.png", largest[2], CASES[0][0])
     draw_motion(folder / "film_impact_motion.png", largest[0], largest[-1])
@@ -103,7 +103,7 @@ def convergence(progress: Progress) -> list[Row]:
     for cells in (5, 10, 20, 40):
         progress(f"{cells} cells in the film")
         results[cells] = oil(cells=cells)
-    e = {cells: each.restitution for cells, each in results.items()}
+    e = {cells: result.restitution for cells, result in results.items()}
     wide = oil(cells=10, domain=1.5).restitution
     return [
         Row("oil, 0.5 m/s: restitution at 5 cells", e[5], e[40]),
@@ -136,7 +136,7 @@ def cavitating(progress: Progress) -> list[Row]:
     progress("cavitation in water")
     results = [impact(*SMOOTHED["8 mm, water, 1 m/s"], cavitation=-1e5), oil(cells=10, cavitation=-1e5)]
     whole = impact(*SMOOTHED["8 mm, water, 1 m/s"]).restitution
-    unsettled = sum(len(each.warnings) for each in results)
+    unsettled = sum(len(result.warnings) for result in results)
     return [
         Row("8 mm, water, 1 m/s: cavitation at -1e5 Pa", results[0].restitution, whole),
         Row("impacts with cavitation whose voids were not found in some step", float(unsettled), 0.0, 0.0),
@@ -230,10 +230,10 @@ def tension(cases: dict[Case, dict[float | None, list[FilmImpact]]]) -> list[Row
     rows, every = [], []
     for (diameter, liquid, _), results in cases.items():
         for angle in ANGLES:
-            every += [(-each.p1.velocity, each) for each in results[angle]]
-            for bare, each in zip(results[None], results[angle]):
-                name = f"{diameter * 1e3:g} mm, {liquid}, {-each.p1.velocity:g} m/s"
-                rows.append(Row(f"{name}: surface tension, {angle:g} degrees", each.restitution, bare.restitution))
+            every += [(-result.p1.velocity, result) for result in results[angle]]
+            for bare, result in zip(results[None], results[angle]):
+                name = f"{diameter * 1e3:g} mm, {liquid}, {-result.p1.velocity:g} m/s"
+                rows.append(Row(f"{name}: surface tension, {angle:g} degrees", result.restitution, bare.restitution))
     return [
         *rows,
         worst("surface tension: energy left unexplained", [(v, r.ledger_error, 0.0) for v, r in every], 0.02),
@@ -246,11 +246,11 @@ def film_laws(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
     """Laws of thin films beside the resolved impacts: the largest deviation of each."""
     points: dict[str, list[tuple[float, float, float]]] = {}
     for (diameter, liquid, film), results in cases.items():
-        for each in results:
-            speed = -each.p1.velocity
+        for result in results:
+            speed = -result.p1.velocity
             for name, e in laws_of(diameter, LIQUIDS[liquid], film, speed).items():
-                points.setdefault(name, []).append((speed, e, each.restitution))
-    return [worst(f"restitution by the {name} against the resolved", each) for name, each in points.items()]
+                points.setdefault(name, []).append((speed, e, result.restitution))
+    return [worst(f"restitution by the {name} against the resolved", law_points) for name, law_points in points.items()]
 
 
 def _columns(result: FilmImpact) -> Columns:
@@ -313,8 +313,8 @@ def change_of_slope(stokes: np.ndarray, restitution: np.ndarray) -> float:
     for corner in corners:
         x = np.log(stokes / corner)
         terms = np.stack([np.ones_like(x), np.minimum(x, 0.0), np.maximum(x, 0.0)], axis=1)
-        found = np.linalg.lstsq(terms, np.log(restitution), rcond=None)[0]
-        errors.append(float(((terms @ found - np.log(restitution)) ** 2).sum()))
+        coefficients = np.linalg.lstsq(terms, np.log(restitution), rcond=None)[0]
+        errors.append(float(((terms @ coefficients - np.log(restitution)) ** 2).sum()))
     return float(corners[int(np.argmin(errors))])
 
 

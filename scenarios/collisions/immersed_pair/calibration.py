@@ -36,26 +36,26 @@ def key_of(word: str) -> str:
     return name
 
 
-def settings(given: Sequence[str]) -> dict[str, Any]:
+def settings(texts: Sequence[str]) -> dict[str, Any]:
     """Values by name of texts such as `velocity=0.1`.
 
     >>> settings(["velocity=0.1", "against=wall"])
     {'velocity': 0.1, 'against': 'wall'}
     """
-    found = {}
-    for each in given:
-        key, equals, text = each.partition("=")
+    values = {}
+    for setting in texts:
+        key, equals, text = setting.partition("=")
         if not equals:
-            raise InputError("--set", each, "key=value, such as velocity=0.1")
-        found[key_of(key.strip())] = read_value(text)
-    return found
+            raise InputError("--set", setting, "key=value, such as velocity=0.1")
+        values[key_of(key.strip())] = read_value(text)
+    return values
 
 
 def fit(
     material: str,
     match: Sequence[Path],
     varied: Sequence[Variable],
-    given: Mapping[str, Any],
+    fixed: Mapping[str, Any],
     *,
     trials: int = 30,
     progress: Callable[[Trial], None] = lambda _: None,
@@ -65,7 +65,7 @@ def fit(
     material  of both bodies, whose values are changed
     match     files of measured points with errors: restitution over stokes or angle, or rebound angle over angle
     varied    keys and their ranges
-    given     values by name that all collisions share
+    fixed     values by name that all collisions share
     trials    number of sets of values; the first ones fill the ranges, the others lie about the best fit
     progress  called after every trial
     errors    InputError for wrong names or data, before any collision
@@ -77,30 +77,30 @@ def fit(
     if not match:
         raise InputError("--match", None, "given: a CSV file of measured collisions with errors")
     data = [read_points(path) for path in match]
-    for path, each in zip(match, data):
-        if not np.isfinite(each.error).all():
+    for path, points in zip(match, data):
+        if not np.isfinite(points.error).all():
             raise InputError(f"{path} error", None, "given for every point", "add a column of standard errors")
     done: list[Trial] = []
     fewest = max(8, 2 * fewest_runs(len(varied)))
     start, chance = unit_samples(len(varied), fewest, "sobol"), np.random.default_rng(1)
     while len(done) < trials:
-        found = response_of(varied, data, done) if len(done) >= fewest else None
+        response = response_of(varied, data, done) if len(done) >= fewest else None
         width = max(LEAST_SCATTER, SCATTER * FALL ** max(0, len(done) - fewest))
         scattered = width * chance.normal(size=len(varied))
-        shares = start[len(done) % fewest] if found is None else np.clip(found.best + scattered, 0.0, 1.0)
-        values = {each.key: each.value(float(share)) for each, share in zip(varied, shares)}
-        done.append(_trial(len(done), material, dict(given), values, data))
+        shares = start[len(done) % fewest] if response is None else np.clip(response.best + scattered, 0.0, 1.0)
+        values = {variable.key: variable.value(float(share)) for variable, share in zip(varied, shares)}
+        done.append(_trial(len(done), material, dict(fixed), values, data))
         progress(done[-1])
         if len(done) == 1 and not done[0].computed:  # what is the same in all collisions
-            _collisions(material, dict(given) | values, data)
+            _collisions(material, dict(fixed) | values, data)
     return Calibration(tuple(varied), tuple(data), tuple(done), response_of(varied, data, done))
 
 
 def _trial(
-    number: int, material: str, given: Mapping[str, Any], values: dict[str, float], data: Sequence[Points]
+    number: int, material: str, fixed: Mapping[str, Any], values: dict[str, float], data: Sequence[Points]
 ) -> Trial:
     try:
-        computed = _collisions(material, {**given, **values}, data)
+        computed = _collisions(material, {**fixed, **values}, data)
     except CfddemError as failure:
         return Trial(number, values, str(failure), (), math.nan)
     return Trial(number, values, "finished", computed, chi2_of(computed, data))
@@ -111,8 +111,10 @@ def _collisions(material: str, values: Mapping[str, Any], data: Sequence[Points]
     own = {name: value for name, value in values.items() if name in Material.model_fields}
     solid = Material(**MATERIALS[material].model_dump() | own)
     rest = {name: value for name, value in values.items() if name not in own}
-    found = [values_at(each, lambda **point: collide(solid, **rest | point), each.place) for each in data]
-    computed = np.concatenate(found)
+    values_of_data = [
+        values_at(points, lambda **point: collide(solid, **rest | point), points.place) for points in data
+    ]
+    computed = np.concatenate(values_of_data)
     if not np.isfinite(computed).all():
         raise InputError("data", None, "of collisions that have these values", "a computed one has none")
     return tuple(computed.tolist())

@@ -168,18 +168,18 @@ def integrators(curves: Curves) -> list[Row]:
         ("e_dry 0.9 to 0.98", 32, (0.9, 0.98), 1e-3),
         ("e_dry 0.5 to 0.9", 12, (0.5, 0.9), 4e-3),
     ):
-        found = Integrated()
+        impacts = Integrated()
         for impact in drawn(count, seed=7, restitution=span):
-            found.add(impact)
+            impacts.add(impact)
         group = f"integrators/{title.replace(' ', '_')}"
         for name in ("drift", "verlet", "verlet_with_warning"):
-            curves[f"{group}/{name}"] = _columns(getattr(found, name))
-        mix = f"{found.deformed} of {count} elastohydrodynamic; plain Verlet refused {found.refused}"
-        rows += [worst(f"drift at 2 %, {title}: e", found.drift, limit, note=mix)]
-        if found.verlet:
-            rows += [worst(f"Verlet, film resolved, {title}: e", found.verlet, 0.012, note=mix)]
-        if found.verlet_with_warning:
-            rows += [worst(f"Verlet, with warning, {title}: e", found.verlet_with_warning, note=mix)]
+            curves[f"{group}/{name}"] = _columns(getattr(impacts, name))
+        mix = f"{impacts.deformed} of {count} elastohydrodynamic; plain Verlet refused {impacts.refused}"
+        rows += [worst(f"drift at 2 %, {title}: e", impacts.drift, limit, note=mix)]
+        if impacts.verlet:
+            rows += [worst(f"Verlet, film resolved, {title}: e", impacts.verlet, 0.012, note=mix)]
+        if impacts.verlet_with_warning:
+            rows += [worst(f"Verlet, with warning, {title}: e", impacts.verlet_with_warning, note=mix)]
     return rows
 
 

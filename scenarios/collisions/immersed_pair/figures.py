@@ -91,7 +91,7 @@ def _legendre(axes: Any, fit: dict[str, Any]) -> None:
     """The fit for the densities of steel to Delrin in water, with the scatter of experiments."""
     stokes = np.geomspace(5, 3000, 200)
     heavy, light = (
-        np.array([legendre(each * (1.0 + 0.5 / density), 0.97) for each in stokes]) for density in (7.78, 1.40)
+        np.array([legendre(number * (1.0 + 0.5 / density), 0.97) for number in stokes]) for density in (7.78, 1.40)
     )
     axes.fill_between(stokes, heavy, light, color="#c9c9c9", lw=0, zorder=0.6, label="fit of Legendre et al. (2006)")
     axes.plot(

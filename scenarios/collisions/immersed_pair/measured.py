@@ -68,25 +68,25 @@ def compare_points(path: Path, collide: Collide, figure: Path) -> MeasuredCollis
         np.linspace(max(0.0, low - 2.0), min(89.0, high + 2.0), ON_THE_LINE))  # fmt: skip
 
     curve = values_at(points, collide, spaced)
-    made = MeasuredComparison(points, values_at(points, collide, points.place), 0.0, (spaced, curve))
-    _draw(made, figure)
-    return MeasuredCollisions(made, figure)
+    comparison = MeasuredComparison(points, values_at(points, collide, points.place), 0.0, (spaced, curve))
+    _draw(comparison, figure)
+    return MeasuredCollisions(comparison, figure)
 
 
 def values_at(points: Points, collide: Collide, places: Array) -> Array:
     """Computed values of the quantity of measured points, at Stokes numbers or angles."""
     name = FIELDS.get(points.quantity, points.quantity)
-    return np.array([getattr(collide(**{points.against: float(each)}), name) for each in places])
+    return np.array([getattr(collide(**{points.against: float(place)}), name) for place in places])
 
 
 def read_points(path: Path) -> Points:
     """Measured points of a file."""
-    columns = {_meaning(each): each for each in read_table(path)}
+    columns = {_meaning(column): column for column in read_table(path)}
     places = [name for name in ("stokes", "angle") if name in columns]
     values = [name for name in ("restitution", "rebound_angle", "rebound_angle_striker") if name in columns]
     if len(places) != 1 or len(values) != 1:
         limit = "a table with one of stokes and angle, and one of restitution and rebound angle"
-        raise InputError(f"{path}", None, limit, f"found {', '.join(each.name for each in columns.values())}")
+        raise InputError(f"{path}", None, limit, f"found {', '.join(column.name for column in columns.values())}")
     for name in (places[0], values[0]):
         if columns[name].unit != UNITS[name]:
             raise InputError(f"{path} {columns[name].name}", columns[name].unit, f"given in units of {UNITS[name]}")
@@ -104,10 +104,10 @@ def _meaning(column: Column) -> str:
     return next((name for name, words in NAMES.items() if column.name in words), column.name)
 
 
-def _draw(made: MeasuredComparison, path: Path) -> None:
-    points = made.points
+def _draw(comparison: MeasuredComparison, path: Path) -> None:
+    points = comparison.points
     drawn, axes = panels(1, width=7.0, height=4.4)
-    axes.plot(*made.line, color=BLUE, label="computed")
+    axes.plot(*comparison.line, color=BLUE, label="computed")
     bars = np.where(np.isfinite(points.error), points.error, 0.0)
     axes.errorbar(
         points.place, points.value, yerr=bars, fmt="o", color=ORANGE, markersize=5.0, capsize=2.5, zorder=3,

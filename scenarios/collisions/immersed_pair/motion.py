@@ -69,7 +69,7 @@ def stage(
     pair = make_particles(
         np.array([place, np.zeros(3)])[:number],
         np.array(setting.radius[:number]),
-        np.array([each.density for each in materials[:number]]),
+        np.array([material.density for material in materials[:number]]),
         velocity=np.array([velocity, np.zeros(3)])[:number],
         spin=np.array(spins)[:number],
         material=np.arange(number, dtype=np.int32),
@@ -246,13 +246,13 @@ WALL = Plane(normal=(-1.0, 0.0, 0.0), material=1)
 """The wall; the sphere moves along x."""
 
 
-def chosen_forces(given: str | Sequence[str]) -> tuple[str, ...]:
+def chosen_forces(names: str | Sequence[str]) -> tuple[str, ...]:
     """Names of forces, from "none", "all", or names joined by commas.
 
     >>> chosen_forces("drag,history"), chosen_forces("none")
     (('drag', 'history'), ())
     """
-    words = given.replace(" ", "").split(",") if isinstance(given, str) else list(given)
+    words = names.replace(" ", "").split(",") if isinstance(names, str) else list(names)
     if words in (["none"], [""]):
         return ()
     if words == ["all"]:

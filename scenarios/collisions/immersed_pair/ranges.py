@@ -45,7 +45,7 @@ class CollisionRange:
 
     def summary(self) -> dict[str, Any]:
         """Plain values of all collisions."""
-        return {"collisions": [each.summary() for each in self.collisions]}
+        return {"collisions": [collision.summary() for collision in self.collisions]}
 
 
 def stokes_numbers(text: str) -> list[float]:
@@ -59,26 +59,26 @@ def stokes_numbers(text: str) -> list[float]:
     limit = "a number, numbers with commas, or LOW..HIGH above 0, such as 1..1000"
     span = re.fullmatch(r"(.+?)\.\.(.+)", text)
     try:
-        found = [float(each) for each in (span.groups() if span else text.split(","))]
+        numbers = [float(number) for number in (span.groups() if span else text.split(","))]
     except ValueError:
         raise InputError("stokes", text, limit) from None
     if span:
-        low, high = found
+        low, high = numbers
         if not 0.0 < low < high < np.inf:
             raise InputError("stokes", text, limit, "the smaller one first")
-        return [float(each) for each in np.geomspace(low, high, IN_A_RANGE)]
-    if len(found) > MOST:
-        raise InputError("stokes", len(found), f"at most {MOST} numbers")
-    return found
+        return [float(number) for number in np.geomspace(low, high, IN_A_RANGE)]
+    if len(numbers) > MOST:
+        raise InputError("stokes", len(numbers), f"at most {MOST} numbers")
+    return numbers
 
 
 def write_csv(collisions: Sequence[Collision], path: Path) -> None:
     """Write one row for each collision; values that are not known are empty."""
-    rows = [each.summary() for each in collisions]
+    rows = [collision.summary() for collision in collisions]
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(f"{name} [{UNITS.get(name, '-')}]" if name in NUMBERS else name for name in rows[0])
-        table.writerows([_cell(each) for each in row.values()] for row in rows)
+        table.writerows([_cell(number) for number in row.values()] for row in rows)
 
 
 def _cell(value: Any) -> Any:

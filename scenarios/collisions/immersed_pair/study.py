@@ -166,7 +166,7 @@ class Impact(Settings):
 
 
 @takes(Impact)
-def collide(given: Impact) -> Collision:
+def collide(impact: Impact) -> Collision:
     """Let one body strike another at rest in a fluid, in the particle engine.
 
     Two of velocity, viscosity and stokes are given: St = m* v / (6 pi eta R*^2).
@@ -175,20 +175,22 @@ def collide(given: Impact) -> Collision:
     >>> wall.mechanism, round(float(wall.restitution), 2)
     ('roughness', 0.53)
     """
-    bodies = Bodies(_both(given.material), _both(given.diameter), given.against)
-    velocity, viscosity = _speed_and_viscosity(bodies, given.velocity, given.viscosity, given.stokes)
-    laws = given.laws(viscosity)
+    bodies = Bodies(_both(impact.material), _both(impact.diameter), impact.against)
+    velocity, viscosity = _speed_and_viscosity(bodies, impact.velocity, impact.viscosity, impact.stokes)
+    laws = impact.laws(viscosity)
     laws.check()
-    full, density, gravity = given.trajectory == "full", given.fluid_density, given.gravity
+    full, density, gravity = impact.trajectory == "full", impact.fluid_density, impact.gravity
     table = pair_table(bodies.materials)
-    setting = _setting(table[0, 1], bodies, velocity, viscosity, given.angle, given.step, laws)
-    caveats = _check_film_step(setting, laws, given.step)
-    simulation = stage(setting, table, bodies.materials, laws, full, given.spin)
-    forces = chosen_forces(given.surroundings)
-    fluid = fluid_around(simulation, forces, density, viscosity, gravity, given.against == "wall")
-    history = integrate(simulation, setting, full, fluid, given.until)
-    found = _result(simulation, setting, table, history, laws, full, caveats)
-    return found if given.stokes is None or not laws.film else replace(found, stokes=given.stokes)  # without round-off
+    setting = _setting(table[0, 1], bodies, velocity, viscosity, impact.angle, impact.step, laws)
+    caveats = _check_film_step(setting, laws, impact.step)
+    simulation = stage(setting, table, bodies.materials, laws, full, impact.spin)
+    forces = chosen_forces(impact.surroundings)
+    fluid = fluid_around(simulation, forces, density, viscosity, gravity, impact.against == "wall")
+    history = integrate(simulation, setting, full, fluid, impact.until)
+    collision = _result(simulation, setting, table, history, laws, full, caveats)
+    if impact.stokes is None or not laws.film:
+        return collision
+    return replace(collision, stokes=impact.stokes)  # without round-off
 
 
 def _both(value: Any) -> tuple[Any, Any]:
@@ -209,13 +211,15 @@ class Bodies(NamedTuple):
 
     def reduced(self) -> tuple[float, float]:
         """Reduced radius [m] and reduced mass [kg]."""
-        for each in self.materials:
-            _check("material", each, isinstance(each, Material), "a Material, such as MATERIALS['glass']")
+        for material in self.materials:
+            _check("material", material, isinstance(material, Material), "a Material, such as MATERIALS['glass']")
         for name, diameter in zip(("diameter", "diameter of the target"), self.diameters):
             _check(name, diameter, 1e-9 <= diameter <= 1e3, "between 1e-9 and 1000 m")
         most = ROUGH * min(self.diameters)
-        for each in self.materials:
-            _check("roughness", each.roughness, each.roughness <= most, f"at most 5 % of a diameter, {most:.3g} m")
+        for material in self.materials:
+            _check(
+                "roughness", material.roughness, material.roughness <= most, f"at most 5 % of a diameter, {most:.3g} m"
+            )
         wall = self.against == "wall"
         mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(self.materials, self.diameters)]
         other = (math.inf, math.inf) if wall else (0.5 * self.diameters[1], mass[1])
@@ -226,8 +230,8 @@ def _speed_and_viscosity(
     bodies: Bodies, velocity: float | None, viscosity: float | None, stokes: float | None
 ) -> tuple[float, float]:
     """Speed and viscosity, from any two of the three given values."""
-    given = {"velocity": velocity, "viscosity": viscosity, "stokes": stokes}
-    names = [name for name, value in given.items() if value is not None]
+    choices = {"velocity": velocity, "viscosity": viscosity, "stokes": stokes}
+    names = [name for name, value in choices.items() if value is not None]
     if len(names) != 2:
         raise InputError("velocity, viscosity, stokes", names, "two of the three", "the third follows from them")
     radius, mass = bodies.reduced()

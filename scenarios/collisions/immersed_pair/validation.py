@@ -50,11 +50,11 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 def compare_data(folder: Path, path: Path) -> Row:
     """A row and a figure for measured restitutions of head-on collisions of Delrin at the speed of the target."""
-    found = compare_points(path, lambda **point: collide(MATERIALS["delrin"], velocity=SPEED, **point),
+    comparison = compare_points(path, lambda **point: collide(MATERIALS["delrin"], velocity=SPEED, **point),
                           folder / f"measured_{path.stem}.png").comparison  # fmt: skip
-    points = found.points
-    rows = zip(points.place, found.computed, points.value)
-    return worst(f"measured {points.quantity}, {points.name}: {found.score()['verdict']}", rows)
+    points = comparison.points
+    rows = zip(points.place, comparison.computed, points.value)
+    return worst(f"measured {points.quantity}, {points.name}: {comparison.score()['verdict']}", rows)
 
 
 def gap_histories(curves: Curves) -> list[Row]:
@@ -197,8 +197,10 @@ def _with_sliding_films() -> list[Row]:
     rows = []
     for name, (material, viscosity, span) in CLASSES.items():
         for angle in (20.0, 60.0):
-            given: dict[str, Any] = {"viscosity": viscosity, "stokes": span[1], "angle": angle}
-            full, normal = (collide(MATERIALS[material], film_motions=each, **given) for each in ("full", "normal"))
+            setting: dict[str, Any] = {"viscosity": viscosity, "stokes": span[1], "angle": angle}
+            full, normal = (
+                collide(MATERIALS[material], film_motions=motions, **setting) for motions in ("full", "normal")
+            )
             rows.append(
                 Row(
                     f"{name} St, {angle:.0f} deg: e_t with sliding films; ref. normal films",
@@ -248,9 +250,9 @@ def speeds_after_contact(curves: Curves) -> list[Row]:
             ("and ten times the roughness", "and_history_force", 10.0),
         ):
             path = bounce(fall.windows[-1][1], SURROUNDINGS[name], fall, rougher * ROUGHNESS)
-            for (begin, end), found, known in zip(fall.windows, mean_speeds(*path, fall), fall.measured):
+            for (begin, end), speed, measured in zip(fall.windows, mean_speeds(*path, fall), fall.measured):
                 title = f"Gondret, St {stokes}, {words}: speed from {1e3 * begin:.1f} to {1e3 * end:.1f} ms / U"
-                rows.append(Row(title, found, known))
+                rows.append(Row(title, speed, measured))
     return rows
 
 

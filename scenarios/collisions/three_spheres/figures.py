@@ -29,13 +29,13 @@ def outcome_map(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.nda
 
     figure, axes = panels(width=8.4, height=4.8)
     numbers = np.vectorize(OUTCOMES.index)(table["outcome"])
-    colours = ListedColormap([COLOURS[each] for each in OUTCOMES])
+    colours = ListedColormap([COLOURS[outcome] for outcome in OUTCOMES])
     axes.pcolormesh(
         stokes, theta12, numbers, cmap=colours, norm=BoundaryNorm(np.arange(-0.5, 5.0), 5), shading="nearest"
     )
     axes.grid(False)
-    for each in (known for known in OUTCOMES if known in table["outcome"]):
-        axes.plot([], [], "s", ms=9, color=COLOURS[each], label=MEANINGS[each])
+    for outcome in (name for name in OUTCOMES if name in table["outcome"]):
+        axes.plot([], [], "s", ms=9, color=COLOURS[outcome], label=MEANINGS[outcome])
     label(axes, "Stokes number  $St_n$", "-", r"angle of impact  $\theta_{12}$", "deg", title)
     legend(axes, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure

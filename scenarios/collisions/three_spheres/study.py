@@ -80,12 +80,12 @@ class Triplet:
 
     def summary(self) -> dict[str, Any]:
         """The result without its history, ready for JSON; of repeated contacts of a pair the first is listed."""
-        listed, seen = [], set()
+        listed, listed_keys = [], set()
         for event in self.events:
             key = (event.kind, event.pair)
-            if event.kind != "contact" or key not in seen:
+            if event.kind != "contact" or key not in listed_keys:
                 listed.append(vars(event).copy())
-            seen.add(key)
+            listed_keys.add(key)
         contacts = [event.pair for event in self.events if event.kind == "contact"]
         return {
             "outcome": self.outcome,
@@ -150,7 +150,7 @@ class Collision(Settings):
 
 
 @takes(Collision)
-def simulate_three_spheres(given: Collision) -> Triplet:
+def simulate_three_spheres(collision: Collision) -> Triplet:
     """Let sphere 1 strike sphere 2 of a resting pair 2-3; all spheres are equal and coated with a viscous film.
 
     Gaps and films are scaled with the film of the first pair, delta_12; sphere 1 flies along x.
@@ -160,26 +160,26 @@ def simulate_three_spheres(given: Collision) -> Triplet:
     >>> simulate_three_spheres(stokes=3.5, theta12=45, capillary_number=100).outcome
     'FA'
     """
-    film_ratio, films, spheres = given.film_ratio, (1.0, given.film23, given.film13), given.spheres
+    film_ratio, films, spheres = collision.film_ratio, (1.0, collision.film23, collision.film13), collision.spheres
     numbers = Numbers(
-        given.stokes, film_ratio, given.minimum_gap, 4.0 / given.capillary_number, given.friction, given.restitution,
-        films, given.slowest_bounce,
+        collision.stokes, film_ratio, collision.minimum_gap, 4.0 / collision.capillary_number, collision.friction,
+        collision.restitution, films, collision.slowest_bounce,
     )  # fmt: skip
-    one = math.radians(given.theta12)
+    one = math.radians(collision.theta12)
     state = np.zeros(STATE)
     state[:4] = 1.0, one, 1.0, math.tan(one) / (1.0 / film_ratio + 1.0)
     out_of_reach = (1e3 / film_ratio, 0.5 * math.pi)
-    state[4:6] = (given.gap23, math.radians(given.theta23)) if spheres == 3 else out_of_reach
+    state[4:6] = (collision.gap23, math.radians(collision.theta23)) if spheres == 3 else out_of_reach
     gap13 = view(state, film_ratio, 2).gap
-    if spheres == 3 and gap13 < given.minimum_gap:
-        raise InputError("theta23", given.theta23, "such that sphere 3 does not overlap sphere 1")
+    if spheres == 3 and gap13 < collision.minimum_gap:
+        raise InputError("theta23", collision.theta23, "such that sphere 3 does not overlap sphere 1")
     modes = np.array([JOINED, *(JOINED if gap <= film else APART for gap, film in zip((state[4], gap13), films[1:]))])
 
     diameters = math.cos(one) / film_ratio  # time v_n0 t / delta_12 over time v_10 t / diameter
-    if given.solver == "equations":
-        path = integrate(state, modes, numbers, given.until * diameters, given.tolerance)
+    if collision.solver == "equations":
+        path = integrate(state, modes, numbers, collision.until * diameters, collision.tolerance)
     else:
-        path = integrate_in_engine(state, numbers, given.until * diameters, given.overlap)
+        path = integrate_in_engine(state, numbers, collision.until * diameters, collision.overlap)
     events = tuple(
         Event(kind, PAIRS[pair], time, time / diameters, speed)
         for kind, pair, time, speed in path.events
@@ -439,7 +439,7 @@ def _find_events(
     """Add the events between the last two steps, by linear interpolation."""
     for pair in range(3):
         for kind, at, sign in ((CONTACT, touch, 1.0), (SEPARATE, films[pair], -1.0), (MEET, films[pair], 1.0)):
-            before, after = (sign * (each[pair, 0] - at) for each in pairs)
+            before, after = (sign * (state[pair, 0] - at) for state in pairs)
             if before > 0.0 >= after:
                 share = before / (before - after)
                 speed = abs((1.0 - share) * pairs[0][pair, 1] + share * pairs[1][pair, 1]) / SPEED

@@ -40,10 +40,10 @@ def of(run: Triplet, quantity: str, pair: int) -> float:
     if quantity == "restitution":
         return {12: run.restitution12, 23: run.restitution23}[pair]
     kind, clock = quantity.split()
-    found = [event for event in run.events if event.kind == kind and event.pair == pair]
-    if not found:
+    events = [event for event in run.events if event.kind == kind and event.pair == pair]
+    if not events:
         return math.nan
-    return found[0].time_star if clock == "t_star" else found[0].time
+    return events[0].time_star if clock == "t_star" else events[0].time
 
 
 def printed(_: Path, __: Curves) -> list[Row]:
@@ -196,7 +196,7 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
     )
     angles = np.array([15.0, 22.5, 30.0, 37.5, 45.0, 60.0])
     table = outcomes(fine, angles, until=3.0)
-    head_on = np.array([davis_sitison(each, 1.0, 0.05) for each in fine])
+    head_on = np.array([davis_sitison(number, 1.0, 0.05) for number in fine])
     by_angle = {angle: {key: values[row] for key, values in table.items()} for row, angle in enumerate(angles)}
     save(figures.restitution_curves(fine, by_angle, head_on), folder / "three_spheres_restitution.png")
     runs = [
@@ -207,7 +207,7 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
     ]
     save(figures.sequences(runs), folder / "three_spheres_sequences.png")
     save(
-        figures.gaps({f"St = {each}": hard_spheres(each, 30.0) for each in (7, 12, 20)}, 0.05),
+        figures.gaps({f"St = {number}": hard_spheres(number, 30.0) for number in (7, 12, 20)}, 0.05),
         folder / "three_spheres_gaps.png",
     )
     for title, run, _ in runs:

@@ -145,44 +145,44 @@ class WetImpact(Settings):
 
     def warn(self, pair: Pair) -> tuple[str, ...]:
         """Warn of a minimum gap as large as the film, of a pressure fitted to another liquid, and of a radius in mm."""
-        found = []
+        complaints = []
         if pair.minimum_gap >= pair.film:
-            found.append(
+            complaints.append(
                 f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure "
                 "and does not act; the fitted pressure does not hold at so high a Stokes number"
             )
         if self.glass_transition_pressure is None and self.viscosity < LEAST_VISCOSITY:
-            found.append(
+            complaints.append(
                 f"glass_transition_pressure is that of silicone oil of 10 Pa s, but viscosity is {self.viscosity:g} "
                 "Pa s; give one for this liquid"
             )
         if self.radius >= LARGE_RADIUS:
-            found.append(f"radius is {self.radius:g} m; did you mean {1e-3 * self.radius:g} m?")
-        for each in found:
-            warnings.warn(each, stacklevel=4)
-        return tuple(found)
+            complaints.append(f"radius is {self.radius:g} m; did you mean {1e-3 * self.radius:g} m?")
+        for complaint in complaints:
+            warnings.warn(complaint, stacklevel=4)
+        return tuple(complaints)
 
 
 OF_SOLID = ("density", "youngs_modulus", "poisson", "restitution", "friction")
 
 
 @takes(WetImpact)
-def collide_wet(given: WetImpact) -> WetPair:
+def collide_wet(impact: WetImpact) -> WetPair:
     """Let one wet sphere strike an equal one at rest; the defaults are steel spheres in silicone oil.
 
     >>> slow = collide_wet(stokes=0.5, angle=60.0)
     >>> slow.outcome, round(slow.spin, 2), round(slow.turned)
     ('stick_rotate_separate', 5.42, 47)
     """
-    pair, laws = given.pair(), given.laws
+    pair, laws = impact.pair(), impact.laws
 
     def collision(at: float) -> Motion:
-        if given.solver == "equations":
-            return integrate(pair, laws, at, given.duration)
-        return integrate_in_engine(pair, laws, given.solid, at, given.duration)
+        if impact.solver == "equations":
+            return integrate(pair, laws, at, impact.duration)
+        return integrate_in_engine(pair, laws, impact.solid, at, impact.duration)
 
-    motion = collision(given.angle)
-    bounces = motion.separated and (given.angle == 0.0 or collision(0.0).separated)
+    motion = collision(impact.angle)
+    bounces = motion.separated and (impact.angle == 0.0 or collision(0.0).separated)
     return WetPair(
         outcome="bounce" if bounces else "stick_rotate_separate" if motion.separated else "stick",
         restitution=-float(motion.approach[-1]) / pair.speed if motion.separated else 0.0,
@@ -192,7 +192,7 @@ def collide_wet(given: WetImpact) -> WetPair:
         velocity=pair.speed,
         turned=math.degrees(float(motion.angle[-1])),
         history=_history(motion),
-        warnings=given.warn(pair),
+        warnings=impact.warn(pair),
     )
 
 

@@ -99,19 +99,21 @@ class Stirring(Settings):
 
 
 @takes(Stirring)
-def tumble(given: Stirring) -> Tumbling:
+def tumble(stirring: Stirring) -> Tumbling:
     r"""Stir wet spheres in a periodic box.
 
     The flow is u = U (sin kz, sin kx, sin ky) with one wave in the box and k U the shear rate G. The surface tension
     follows from the capillary number, :math:`Ca = \eta G d/\sigma`, so that viscous films are the same at each.
     """
-    film, viscosity, shear_rate, diameter = given.film, given.viscosity, given.shear_rate, given.diameter
-    samples, until, progress = given.samples, given.until, given.progress
-    surface_tension = viscosity * max(shear_rate, 1.0) * diameter / given.capillary_number
-    thickness = film * (1.0 + given.film_spread * np.random.default_rng(given.seed).uniform(-1.0, 1.0, given.count))
-    liquid = BridgeLaws(viscosity, surface_tension, math.radians(given.contact_angle))
-    run, bridges = _spheres(diameter, thickness, film, liquid, given.solid_fraction, given.seed)
-    flow = Flow(run, shear_rate, given.drag_time)
+    film, viscosity, shear_rate, diameter = stirring.film, stirring.viscosity, stirring.shear_rate, stirring.diameter
+    samples, until, progress = stirring.samples, stirring.until, stirring.progress
+    surface_tension = viscosity * max(shear_rate, 1.0) * diameter / stirring.capillary_number
+    thickness = film * (
+        1.0 + stirring.film_spread * np.random.default_rng(stirring.seed).uniform(-1.0, 1.0, stirring.count)
+    )
+    liquid = BridgeLaws(viscosity, surface_tension, math.radians(stirring.contact_angle))
+    run, bridges = _spheres(diameter, thickness, film, liquid, stirring.solid_fraction, stirring.seed)
+    flow = Flow(run, shear_rate, stirring.drag_time)
     run.particles.velocity[:] = flow.speed
     run.refresh()
     start, all_liquid = _momentum(run), bridges.liquid
@@ -128,7 +130,7 @@ def tumble(given: Stirring) -> Tumbling:
     drift = np.abs(_momentum(run) - start - flow.impulse).max() / carried
     mean, weighed, largest, per_sphere = np.array(counted).T
     return Tumbling(
-        capillary_number=given.capillary_number,
+        capillary_number=stirring.capillary_number,
         surface_tension=surface_tension,
         time=np.arange(samples + 1) * rounds * SUBSTEPS * step,
         mean_size=mean,

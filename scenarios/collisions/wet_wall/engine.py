@@ -197,7 +197,7 @@ def _path(wet: Wet, time: np.ndarray, rows: np.ndarray, stuck: bool) -> Path:
     capillary = np.where(pulled, 0.5 * (drawn[1:] + drawn[:-1]) * rise, 0.0)
     rest = -np.diff(kinetic) - weight - capillary
     lost = (np.where(pulled, 0.0, rest), np.where(pulled, rest, 0.0), capillary, weight)
-    energies = [np.append(0.0, np.cumsum(each)) for each in lost]
+    energies = [np.append(0.0, np.cumsum(loss)) for loss in lost]
     ends = {PHASES[n - 1]: float(time[phase == n][-1]) for n in range(1, 5) if (phase == n).any()}
     return Path(time, np.vstack([rows, *energies]), phase, ends, stuck)
 

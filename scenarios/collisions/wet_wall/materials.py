@@ -59,10 +59,10 @@ FRICTION = {None: 0.195, "tween": 0.160, "glycerol_35": 0.140}
 """Sliding friction of alumina on glass, dry and under liquids: Buck et al. (2018), table 3."""
 
 
-def half_filling(particle: Any, liquid: Any, film: float, given: float | None) -> float:
+def half_filling(particle: Any, liquid: Any, film: float, value: float | None) -> float:
     """The half-filling angle that is given, or was measured for this case."""
-    if given is not None:
-        return given
+    if value is not None:
+        return value
     if isinstance(particle, str) and isinstance(liquid, str):
         measured = HALF_FILLING_ANGLES.get(particle, {}).get(liquid, {})
         for thickness, angle in measured.items():
@@ -78,10 +78,10 @@ def half_filling(particle: Any, liquid: Any, film: float, given: float | None) -
     raise InputError("half_filling_angle", None, "given for a user-defined particle or liquid")
 
 
-def sliding_friction(particle: Any, liquid: Any, given: float | None) -> float:
+def sliding_friction(particle: Any, liquid: Any, value: float | None) -> float:
     """The friction that is given, or was fitted for this case."""
-    if given is not None:
-        return given
+    if value is not None:
+        return value
     if particle == "alumina_1.74" and (liquid is None or isinstance(liquid, str)) and liquid in FRICTION:
         return FRICTION[liquid]
     raise InputError("friction", None, "given for an oblique or spinning impact of this particle and liquid")

@@ -162,7 +162,7 @@ class WetImpact(Settings):
 
 
 @takes(WetImpact)
-def impact(given: WetImpact) -> Impact:
+def impact(strike: WetImpact) -> Impact:
     """Let a sphere strike a wall that carries a liquid layer, from above.
 
     Raises InputError where the contact line of the bridge lies within the layer while the solids touch.
@@ -171,22 +171,24 @@ def impact(given: WetImpact) -> Impact:
     >>> round(sliding.restitution_tangential, 3), round(1 - 0.195 * 1.76 / math.tan(math.radians(60)), 3)
     (0.802, 0.802)
     """
-    ball, velocity, spin = _named("particle", given.particle, BALLS), given.velocity, given.spin
-    if given.wetted:
-        _named("liquid", given.liquid, LIQUIDS)
-    liquid = given.liquid if given.wetted else None
-    oblique = given.angle != 0.0 or spin != 0.0
-    rubs = sliding_friction(given.particle, liquid, given.friction) if oblique or given.friction is not None else None
-    filled = half_filling(given.particle, liquid, given.film, given.half_filling_angle) if given.wetted else None
-    along = velocity * math.tan(math.radians(given.angle))
-    wet = given.wet(ball, filled, rubs or 0.0)
-    if given.wetted and given.smallest_arc is None and given.capillary_phases != "bridge":
+    ball, velocity, spin = _named("particle", strike.particle, BALLS), strike.velocity, strike.spin
+    if strike.wetted:
+        _named("liquid", strike.liquid, LIQUIDS)
+    liquid = strike.liquid if strike.wetted else None
+    oblique = strike.angle != 0.0 or spin != 0.0
+    rubs = (
+        sliding_friction(strike.particle, liquid, strike.friction) if oblique or strike.friction is not None else None
+    )
+    filled = half_filling(strike.particle, liquid, strike.film, strike.half_filling_angle) if strike.wetted else None
+    along = velocity * math.tan(math.radians(strike.angle))
+    wet = strike.wet(ball, filled, rubs or 0.0)
+    if strike.wetted and strike.smallest_arc is None and strike.capillary_phases != "bridge":
         _refuse_the_singular(wet)
-    if given.solver == "particles":
+    if strike.solver == "particles":
         _refuse_other_readings(wet, oblique)
-        path = integrate_in_engine(wet, (ball.material, given.wall), velocity, along, spin)
+        path = integrate_in_engine(wet, (ball.material, strike.wall), velocity, along, spin)
     else:
-        path = integrate(wet, velocity, along, spin, given.tolerance)
+        path = integrate(wet, velocity, along, spin, strike.tolerance)
     return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
 
 
@@ -283,10 +285,10 @@ def _result(
     )
 
 
-def _named(name: str, value: Any, known: dict[str, Any]) -> Any:
+def _named(name: str, value: Any, choices: dict[str, Any]) -> Any:
     """The value of a name; anything but a string is returned as it is."""
     if not isinstance(value, str):
         return value
-    if value not in known:
-        raise InputError(name, value, nearest(value, known))
-    return known[value]
+    if value not in choices:
+        raise InputError(name, value, nearest(value, choices))
+    return choices[value]

@@ -80,17 +80,17 @@ def engine(_: Path, __: Curves) -> list[Row]:
     """Wet wall: the particle engine against the equations, and the velocities below which it lets spheres stick."""
     times, normal, along, spins, slowest = [], [], [], [], []
     for sphere, liquid, film, _filled, speed, angle, spin, friction in IMPACTS:
-        given: dict[str, Any] = {"angle": angle, "spin": spin, "friction": friction, "spring": "cut"}
-        ours = impact(sphere, liquid, film, speed, **given)
-        reference = exact(sphere, liquid, film, speed, **given)
+        options: dict[str, Any] = {"angle": angle, "spin": spin, "friction": friction, "spring": "cut"}
+        ours = impact(sphere, liquid, film, speed, **options)
+        reference = exact(sphere, liquid, film, speed, **options)
         times.append((speed, ours.duration / reference.duration, 1.0))
         normal.append((speed, ours.restitution, reference.restitution))
         if angle:
             along.append((angle, ours.restitution_tangential, reference.restitution_tangential))
             spins.append((angle, ours.spin / reference.spin, 1.0))
     for sphere, liquid, film, published, arc in STICKING:
-        found = sticking_velocity(sphere, liquid, film, precision=2e-3, smallest_arc=arc)
-        slowest.append((published, found / published, 1.0))
+        slowest_velocity = sticking_velocity(sphere, liquid, film, precision=2e-3, smallest_arc=arc)
+        slowest.append((published, slowest_velocity / published, 1.0))
     return [
         worst("wet wall, particle engine over equations: time until the bridge breaks", times, 0.005),
         worst("wet wall, particle engine: restitution against the equations", normal, 0.005),
@@ -104,23 +104,25 @@ def sticking(_: Path, __: Curves) -> list[Row]:
     """Wet wall: velocities below which spheres stick."""
     rows = []
     for sphere, liquid, film, reference, arc in STICKING:
-        found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc, solver="equations")
+        velocity = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc, solver="equations")
         floor = "" if arc is None else f", arc >= {arc * 1e6:.0f} um"
         name = f"wet wall: {sphere} sticks, {liquid}, {film * 1e6:.0f} um{floor}"
-        rows.append(Row(name, found, reference, 0.02 * reference, "m/s"))
+        rows.append(Row(name, velocity, reference, 0.02 * reference, "m/s"))
     case = ("glass_1.74", "water")
     for least in (1e-6, FLOOR, 20e-6):
-        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least, solver="equations")
+        velocity = sticking_velocity(
+            *case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least, solver="equations"
+        )
         rows.append(
-            Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {least * 1e6:.0f} um", found, unit="m/s")
+            Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {least * 1e6:.0f} um", velocity, unit="m/s")
         )
     readings: tuple[dict[str, Any], ...] = (
         {"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}
     )  # fmt: skip
     for options in readings:
-        found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, solver="equations", **options)
+        velocity = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, solver="equations", **options)
         chosen = " ".join(f"{name} {value}" for name, value in options.items())
-        rows.append(Row(f"wet wall: glass_1.74 sticks, 100 um, {chosen}", found, 0.345, unit="m/s"))
+        rows.append(Row(f"wet wall: glass_1.74 sticks, 100 um, {chosen}", velocity, 0.345, unit="m/s"))
     return rows
 
 

@@ -45,7 +45,7 @@ def neighbours(points, count, reach):
         cell = (place[n, 0] * cells[1] + place[n, 1]) * cells[2] + place[n, 2]
         following[n] = head[cell]
         head[cell] = n
-    start, found, used = np.zeros(count + 1, np.int64), np.empty(MOST * count, np.int64), 0
+    start, others, used = np.zeros(count + 1, np.int64), np.empty(MOST * count, np.int64), 0
     for n in range(count):
         for a in range(max(place[n, 0] - 1, 0), min(place[n, 0] + 2, cells[0])):
             for b in range(max(place[n, 1] - 1, 0), min(place[n, 1] + 2, cells[1])):
@@ -55,24 +55,24 @@ def neighbours(points, count, reach):
                         square = 0.0
                         for axis in range(3):
                             square += (points[other, axis] - points[n, axis]) ** 2
-                        if other != n and square < reach * reach and used < len(found):
-                            found[used] = other
+                        if other != n and square < reach * reach and used < len(others):
+                            others[used] = other
                             used += 1
                         other = following[other]
         start[n + 1] = used
-    return start, found[:used]
+    return start, others[:used]
 
 
 @serial
-def weights(points, start, found, dx):
+def weights(points, start, others, dx):
     """For each pair: a_ij [1/m2], and the volume times the gradient of the kernel at the first point [1/m]."""
     h, volume = SMOOTHING * dx, dx**3
-    laplacian, gradient = np.empty(len(found)), np.empty((len(found), 3))
+    laplacian, gradient = np.empty(len(others)), np.empty((len(others), 3))
     for n in range(len(start) - 1):
         for pair in range(start[n], start[n + 1]):
             square = 0.0
             for axis in range(3):
-                gradient[pair, axis] = points[n, axis] - points[found[pair], axis]
+                gradient[pair, axis] = points[n, axis] - points[others[pair], axis]
                 square += gradient[pair, axis] ** 2
             distance = math.sqrt(square)
             steep = slope(distance, h)
@@ -93,12 +93,12 @@ def row_sums(start, values):
 
 
 @serial
-def divergence(velocity, start, found, origin, signs, gradient, stretch):
+def divergence(velocity, start, others, origin, signs, gradient, stretch):
     """Divergence of the velocity: sum of S_i (u_j - u_i) . grad W over the neighbours (n,) [1/s]."""
     sums = np.zeros(len(velocity))
     for n in range(len(velocity)):
         for pair in range(start[n], start[n + 1]):
-            other = found[pair]
+            other = others[pair]
             for a in range(3):
                 change = signs[other, a] * velocity[origin[other], a] - velocity[n, a]
                 for b in range(3):
@@ -107,14 +107,14 @@ def divergence(velocity, start, found, origin, signs, gradient, stretch):
 
 
 @serial
-def gradient_of(pressure, start, found, origin, gradient, stretch, surface):
+def gradient_of(pressure, start, others, origin, gradient, stretch, surface):
     """Gradient of pressure: S_i times the sum of (p_j - p_i) grad W; at the surface of (p_j + p_i) (n, 3) [Pa/m]."""
     sums = np.zeros((len(pressure), 3))
     for n in range(len(pressure)):
         x, y, z = 0.0, 0.0, 0.0
         own = pressure[n] if surface[n] else -pressure[n]
         for pair in range(start[n], start[n + 1]):
-            both = pressure[origin[found[pair]]] + own
+            both = pressure[origin[others[pair]]] + own
             x += both * gradient[pair, 0]
             y += both * gradient[pair, 1]
             z += both * gradient[pair, 2]
@@ -124,13 +124,13 @@ def gradient_of(pressure, start, found, origin, gradient, stretch, surface):
 
 
 @serial
-def moment_across(points, start, found, gradient):
+def moment_across(points, start, others, gradient):
     """Second moment of the neighbours in the horizontal plane; 1 within the liquid (n,) [-]."""
     sums = np.zeros(len(start) - 1)
     for n in range(len(sums)):
         for pair in range(start[n], start[n + 1]):
             for axis in range(2):
-                sums[n] += 0.5 * (points[found[pair], axis] - points[n, axis]) * gradient[pair, axis]
+                sums[n] += 0.5 * (points[others[pair], axis] - points[n, axis]) * gradient[pair, axis]
     return sums
 
 
@@ -139,5 +139,5 @@ def full_sum(dx: float) -> float:
     side = np.arange(-3, 4) * dx
     points = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     order = np.argsort((points**2).sum(axis=1), kind="stable")
-    start, found = neighbours(points[order], 1, REACH * dx)
-    return float(weights(points[order], start, found, dx)[0].sum())
+    start, others = neighbours(points[order], 1, REACH * dx)
+    return float(weights(points[order], start, others, dx)[0].sum())

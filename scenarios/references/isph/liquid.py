@@ -89,16 +89,16 @@ class SmoothedLiquid:
 
     def _solids(self) -> list[tuple[Seen, np.ndarray, float]]:
         """For plate and bead: what is seen, unit normals towards the liquid (n, 3), and the vertical speed."""
-        found: list[tuple[Seen, np.ndarray, float]] = []
+        solids: list[tuple[Seen, np.ndarray, float]] = []
         if self.plate is not None:
             up = np.zeros_like(self.place)
             up[:, 2] = 1.0
-            found.append((self.plate.at(self.place[:, 2]), up, 0.0))
+            solids.append((self.plate.at(self.place[:, 2]), up, 0.0))
         if self.bead is not None and self.cap is not None:
             away = self.place - np.array([0.0, 0.0, self.bead.gap + self.bead.radius])
             far = np.linalg.norm(away, axis=1)
-            found.append((self.cap.at(far - self.bead.radius), away / far[:, None], self.bead.velocity))
-        return found
+            solids.append((self.cap.at(far - self.bead.radius), away / far[:, None], self.bead.velocity))
+        return solids
 
     def apply_forces(self, dt: float) -> None:
         """Viscous stress with no slip on the solids, and gravity."""
@@ -115,14 +115,14 @@ class SmoothedLiquid:
         """Add the viscous stress of a step, that of the solids implicitly; the bead feels the reaction."""
         change = rate * np.stack([self._sum(self.laplacian * apart) for apart in self._differences()], axis=1)
         resisted, dragged = np.ones(len(self.place)), np.zeros_like(self.place)
-        for seen, _, speed in self.solids:
-            friction = rate * seen.friction(self.dx)
+        for view, _, speed in self.solids:
+            friction = rate * view.friction(self.dx)
             resisted += friction
             dragged[:, 2] += friction * speed
         self.velocity = (self.velocity + change + dragged) / resisted[:, None]
         if self.bead is not None:
-            seen, _, speed = self.solids[-1]
-            gained = rate * seen.friction(self.dx) * (speed - self.velocity[:, 2])
+            view, _, speed = self.solids[-1]
+            gained = rate * view.friction(self.dx) * (speed - self.velocity[:, 2])
             self.bead.velocity -= 4.0 * self.mass * float(gained.sum()) / self.bead.mass
 
     def _differences(self) -> list[np.ndarray]:
@@ -149,34 +149,34 @@ class SmoothedLiquid:
         every = (self.start, self.found, self.origin, self.signs, self.gradient, self.stretch)
         source = -kernel.divergence(self.velocity, *every)
         slopes = [(self.velocity * normal).sum(axis=1) for _, normal, _ in self.solids]
-        for (seen, _, _), slope in zip(self.solids, slopes):
-            source -= seen.slope * slope
+        for (view, _, _), slope in zip(self.solids, slopes):
+            source -= view.slope * slope
         noise = heavy * NOISE * float(np.abs(self.velocity).max()) / self.dx
         self.pressure = self._solve(matrix, np.where(alone, 0.0, heavy * source), self.pressure, noise)
         if bead is not None:
-            seen, normal = self.solids[-1][:2]
+            view, normal = self.solids[-1][:2]
             moving = self._solve(
                 matrix,
-                np.where(alone, 0.0, heavy * seen.slope * normal[:, 2]),
+                np.where(alone, 0.0, heavy * view.slope * normal[:, 2]),
                 np.zeros_like(source),
                 heavy * NOISE / self.dx,
             )
-            still = self._push(seen, normal, self.pressure, heavy * slopes[-1])
-            rate = self._push(seen, normal, moving, -heavy * normal[:, 2])
+            still = self._push(view, normal, self.pressure, heavy * slopes[-1])
+            rate = self._push(view, normal, moving, -heavy * normal[:, 2])
             share, arrived = dt / bead.mass, bead.velocity
             bead.velocity = (bead.velocity + share * still) / (1.0 - share * rate)
             bead.force = still + rate * bead.velocity
             self.losses["impulsive"] += 0.125 * bead.mass * (bead.velocity - arrived) ** 2
             self.pressure = self.pressure + bead.velocity * moving
             slopes[-1] = slopes[-1] - bead.velocity * normal[:, 2]
-        self._correct(dt / self.density, [heavy * each for each in slopes])
+        self._correct(dt / self.density, [heavy * slope for slope in slopes])
         self.losses["exchange"] += before - self.energy() - (self.losses["impulsive"] - explained)
 
     def _thin_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Which particles lie in a gap too thin for a second layer, and their height over that of the gap."""
         if self.bead is None or self.plate is None:
             return np.zeros(len(self.place), np.bool_), np.zeros(len(self.place))
-        plate, cap = (seen for seen, _, _ in self.solids)
+        plate, cap = (view for view, _, _ in self.solids)
         height = plate.distance + cap.distance
         thin, share = height < THIN * self.dx, plate.distance / np.maximum(height, 1e-12)
         return thin, share
@@ -187,28 +187,30 @@ class SmoothedLiquid:
         stretch += np.eye(3)
         if not self.solids:
             return stretch
-        seen = 1.0 - sum(seen.hidden for seen, _, _ in self.solids)
+        open_share = 1.0 - sum(view.hidden for view, _, _ in self.solids)
         if self.thin.any():
-            seen = np.where(self.thin, kernel.moment_across(self.every, self.start, self.found, self.gradient), seen)
-            seen = np.minimum(seen, 1.0)
-        distances = np.stack([seen.distance for seen, _, _ in self.solids])
+            open_share = np.where(
+                self.thin, kernel.moment_across(self.every, self.start, self.found, self.gradient), open_share
+            )
+            open_share = np.minimum(open_share, 1.0)
+        distances = np.stack([view.distance for view, _, _ in self.solids])
         normals = np.stack([normal for _, normal, _ in self.solids])
         normal = normals[distances.argmin(axis=0), np.arange(len(self.place))]
         along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-        return np.asarray(stretch + (1.0 / np.maximum(seen, LEAST) - 1.0)[:, None, None] * along)
+        return np.asarray(stretch + (1.0 / np.maximum(open_share, LEAST) - 1.0)[:, None, None] * along)
 
     def _shift(self, dt: float) -> np.ndarray:
         """Displacement of particles inside the liquid towards where there are fewer, in proportion to their speed."""
         uneven = np.stack([self._sum(self.gradient[:, axis]) for axis in range(3)], axis=1)
-        for seen, normal, _ in self.solids:
-            uneven -= np.where(self.thin, 0.0, seen.push)[:, None] * normal
+        for view, normal, _ in self.solids:
+            uneven -= np.where(self.thin, 0.0, view.push)[:, None] * normal
         reach = SHIFT * kernel.SMOOTHING * self.dx * dt * np.linalg.norm(self.velocity, axis=1)
         return np.where((self.surface | self.thin)[:, None], 0.0, -reach[:, None] * uneven)
 
     def _matrix(self) -> tuple[csr_matrix, np.ndarray]:
         """The matrix of the pressure, and which particles have none."""
         count, liquid = len(self.place), self._sum(self.laplacian)
-        around = liquid + sum(seen.count for seen, _, _ in self.solids)
+        around = liquid + sum(view.count for view, _, _ in self.solids)
         missing = np.maximum(self.full - around, 0.0)
         self.surface = missing > INSIDE * self.full
         surface = np.where(self.surface, 2.0 * missing, 0.0) + (FIXED * self.full if self.plate is None else 0.0)
@@ -234,7 +236,7 @@ class SmoothedLiquid:
             right = right - right.mean()  # a closed box can only turn its liquid
         inverse = 1.0 / matrix.diagonal()
         precondition = LinearOperator(matrix.shape, matvec=lambda x: inverse * x)
-        found, failed = bicgstab(
+        pressure, failed = bicgstab(
             matrix,
             right,
             x0=guess,
@@ -244,22 +246,22 @@ class SmoothedLiquid:
             M=precondition,
         )
         if failed:
-            what = f"the pressure has not converged to {TOLERANCE:g} in {ITERATIONS} iterations"
-            raise RunFailed(f"{what}, bead at {self.bead.gap if self.bead else math.inf:g} m; take more layers")
-        return np.asarray(found)
+            complaint = f"the pressure has not converged to {TOLERANCE:g} in {ITERATIONS} iterations"
+            raise RunFailed(f"{complaint}, bead at {self.bead.gap if self.bead else math.inf:g} m; take more layers")
+        return np.asarray(pressure)
 
-    def _push(self, seen: Seen, normal: np.ndarray, pressure: np.ndarray, slope: np.ndarray) -> float:
+    def _push(self, view: Seen, normal: np.ndarray, pressure: np.ndarray, slope: np.ndarray) -> float:
         """Force of the liquid's pressure on a solid, upwards, of the whole film [N]."""
-        return float(-4.0 * self.dx**3 * (normal[:, 2] * (2.0 * pressure * seen.push - slope * seen.lag)).sum())
+        return float(-4.0 * self.dx**3 * (normal[:, 2] * (2.0 * pressure * view.push - slope * view.lag)).sum())
 
     def _correct(self, rate: float, slopes: list[np.ndarray]) -> None:
         """Subtract the gradient of the pressure, with its slope at the solids."""
         gradient = kernel.gradient_of(
             self.pressure, self.start, self.found, self.origin, self.gradient, self.stretch, self.surface
         )
-        for (seen, normal, _), slope in zip(self.solids, slopes):
-            own = np.where(self.surface, 2.0 * self.pressure * seen.push, 0.0)
-            gradient -= (own - slope * seen.lag)[:, None] * normal
+        for (view, normal, _), slope in zip(self.solids, slopes):
+            own = np.where(self.surface, 2.0 * self.pressure * view.push, 0.0)
+            gradient -= (own - slope * view.lag)[:, None] * normal
         if self.plate is not None:
             self.plate_force = -self._push(*self.solids[0][:2], self.pressure, slopes[0])
         self.losses["impulsive"] += 0.5 * self.mass * rate**2 * float((gradient**2).sum())
@@ -301,7 +303,7 @@ class Solid:
     def at(self, distance: np.ndarray) -> Seen:
         """The integrals for particles at these distances (n,) [m]; zero beyond the reach."""
         tables = (self.count, self.slope, self.push, self.lag, self.hidden)
-        return Seen(distance, *(np.interp(distance, self.distance, each, right=0.0) for each in tables))
+        return Seen(distance, *(np.interp(distance, self.distance, column, right=0.0) for column in tables))
 
 
 @dataclass(frozen=True)
@@ -329,7 +331,7 @@ def solid(dx: float, radius: float = np.inf) -> Solid:
     h, reach = SMOOTHING * dx, REACH * dx
     distance = np.linspace(0.0, reach, POINTS)
     s = (np.arange(STEPS) + 0.5) * reach / STEPS
-    steep = -np.array([kernel.slope.py_func(each, h) for each in s])
+    steep = -np.array([kernel.slope.py_func(place, h) for place in s])
     if np.isinf(radius):
         cosine = distance[:, None] / s
     else:
@@ -375,9 +377,9 @@ def images(points: np.ndarray, size: np.ndarray, reach: float) -> tuple[np.ndarr
             copy[:, axis] = 2.0 * plane - copy[:, axis]
             turned[:, axis] *= -1.0
             copies.append((copy, origin[close], turned))
-        places = np.concatenate([places, *(each[0] for each in copies)])
-        origin = np.concatenate([origin, *(each[1] for each in copies)])
-        signs = np.concatenate([signs, *(each[2] for each in copies)])
+        places = np.concatenate([places, *(image[0] for image in copies)])
+        origin = np.concatenate([origin, *(image[1] for image in copies)])
+        signs = np.concatenate([signs, *(image[2] for image in copies)])
     return places, origin, signs
 
 

@@ -89,7 +89,7 @@ def fit_shares(rows: Sequence[dict[str, Any]]) -> Shares:
         return variance * _of(row, drag, shares.inertia * row["inertia"], shares.time)
 
     starts = (np.log([0.5, 0.5, inertia, 1.0]) for inertia in (0.03, 0.3))
-    return Shares(*(float(each) for each in np.exp(_fit_all(rows, model, starts))))
+    return Shares(*(float(number) for number in np.exp(_fit_all(rows, model, starts))))
 
 
 def fit_levels(rows: Sequence[dict[str, Any]]) -> Levels:
@@ -99,7 +99,7 @@ def fit_levels(rows: Sequence[dict[str, Any]]) -> Levels:
         levels = Levels(*np.exp(numbers))
         return (levels.along if along else levels.across) * _of(row, 1.0, 0.0, levels.time)
 
-    return Levels(*(float(each) for each in np.exp(_fit_all(rows, model, [np.log([0.1, 0.1, 1.0])]))))
+    return Levels(*(float(number) for number in np.exp(_fit_all(rows, model, [np.log([0.1, 0.1, 1.0])]))))
 
 
 def _of(row: dict[str, Any], drag: float, inertia: float, time: float) -> np.ndarray:
@@ -122,5 +122,5 @@ def _fit_all(
                 parts.append((model(numbers, row, way == "along") - measured) / measured[0])
         return np.concatenate(parts)
 
-    found = min((least_squares(missed, start) for start in starts), key=lambda each: float(each.cost))
-    return np.asarray(found.x)
+    best = min((least_squares(missed, start) for start in starts), key=lambda fit: float(fit.cost))
+    return np.asarray(best.x)

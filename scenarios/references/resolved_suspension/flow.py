@@ -58,10 +58,10 @@ class Flow:
 
     def sums(self) -> np.ndarray:
         """Sums over the cells of every sphere that its exchange of momentum needs (spheres, SUMS)."""
-        found = np.empty((len(self.positions), spheres.SUMS))
+        sums = np.empty((len(self.positions), spheres.SUMS))
         lattice.momentum_of(self.populations, self.share, self._arriving)
-        spheres.gather(self.positions, self.radius, self.share, self.softness, self._arriving, self.force, found)
-        return found
+        spheres.gather(self.positions, self.radius, self.share, self.softness, self._arriving, self.force, sums)
+        return sums
 
     def advance(self, velocity: np.ndarray, spin: np.ndarray) -> None:
         """One step of the fluid around spheres that move with these velocities and spins."""
@@ -82,11 +82,11 @@ class Flow:
 
     def velocity(self) -> np.ndarray:
         """Velocity in every cell (3, z, y, x): of the fluid, and of solids where there are any."""
-        found = np.empty_like(self.target)
-        lattice.momentum_of(self.populations, np.ones_like(self.share), found)
-        found += 0.5 * self.force[:, None, None, None]
+        velocity = np.empty_like(self.target)
+        lattice.momentum_of(self.populations, np.ones_like(self.share), velocity)
+        velocity += 0.5 * self.force[:, None, None, None]
         share = np.minimum(self.weight, 1.0)
-        return (1.0 - share) * found + self.target
+        return (1.0 - share) * velocity + self.target
 
 
 def force_of(sums: np.ndarray, velocity: np.ndarray, spin: np.ndarray) -> np.ndarray:

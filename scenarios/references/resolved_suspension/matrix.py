@@ -86,8 +86,8 @@ class Kept:
         suspension = self.suspension
         with np.load(path) as state:
             suspension.flow.populations[:] = state["populations"]
-            for each in ("velocity", "spin", "contact_impulse", "touching"):
-                setattr(suspension, each, state[each])
+            for name in ("velocity", "spin", "contact_impulse", "touching"):
+                setattr(suspension, name, state[name])
             suspension.steps = int(state["steps"])
             tree = nested({key: state[key] for key in state.files if "/" in key})
         suspension.solver.restore(tree["solver"])
@@ -158,14 +158,14 @@ def even(point: Point, series: Series) -> dict[str, Any] | None:
     return {"window_of_time": [start, end], **measure(point, series, start, end)} if end - start >= LEAST_EVEN else None
 
 
-def write_table(rows: list[dict[str, Any]], path: Path, made: str) -> None:
+def write_table(rows: list[dict[str, Any]], path: Path, origin: str) -> None:
     """Write rows as a table, one to a line.
 
-    made  how the rows were made
+    origin  how the rows were made
     """
     lines = ",\n".join(json.dumps(row, separators=(",", ":")) for row in rows)
     with replacing(path) as fresh:
-        fresh.write_text(f'{{"made": {json.dumps(made)},\n"rows": [\n{lines}\n]}}\n', encoding="utf-8")
+        fresh.write_text(f'{{"made": {json.dumps(origin)},\n"rows": [\n{lines}\n]}}\n', encoding="utf-8")
 
 
 def main() -> None:
@@ -173,7 +173,7 @@ def main() -> None:
     use_threads(1)
     folder, *numbers = sys.argv[1:]
     listed = list(runs())
-    chosen = [listed[int(each)] for each in numbers] or listed
+    chosen = [listed[int(number)] for number in numbers] or listed
     rows = [run(point, Path(folder), print) for point in chosen]
     write_table(rows, Path(folder) / "table.json", MADE)
 

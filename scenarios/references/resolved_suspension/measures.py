@@ -55,12 +55,12 @@ class Series:
 
     def arrays(self) -> dict[str, Any]:
         """The samples as arrays."""
-        return {each: np.asarray(values) for each, values in vars(self).items()}
+        return {name: np.asarray(values) for name, values in vars(self).items()}
 
     @classmethod
     def of(cls, arrays: dict[str, Any]) -> Series:
         """The samples again."""
-        return cls(int(arrays["every"]), *(list(arrays[each]) for each in list(vars(cls()))[1:]))
+        return cls(int(arrays["every"]), *(list(arrays[name]) for name in list(vars(cls()))[1:]))
 
 
 def even_window(point: Point, series: Series) -> tuple[float, float]:
@@ -98,7 +98,7 @@ def measure(
     drag = float(arrays["force"][:, :, ALONG].mean()) - pressure
     velocity, force = (_deviation(arrays[name]) / scale for name, scale in (("velocity", w), ("force", drag)))
     phase = 2.0 * math.pi / point.cells * arrays["position"]
-    seen = without_waves(force + velocity, phase)
+    fluid_velocity = without_waves(force + velocity, phase)
     return {
         "spheres": point.count,
         "solid_fraction": solid,
@@ -108,7 +108,7 @@ def measure(
         **_agitation(velocity, block),
         **_box_waves(velocity, phase, block),
         **_collisions(arrays, point.count, step, w, block),
-        **_fluctuating_force(averaged(force, quarter), averaged(seen, quarter), block),
+        **_fluctuating_force(averaged(force, quarter), averaged(fluid_velocity, quarter), block),
         "lag": [round(k * step, 5) for k in range(LAGS)],
         "window": quarter * step,
         "inertia": inertia_coefficient(point.density_ratio, 1.0, solid) * sphere_volume(point.diameter)
@@ -179,25 +179,25 @@ def _collisions(arrays: dict[str, Any], count: int, step: float, w: float, block
     return {"collision_rate": block_mean(2.0 * arrays["collisions"] / count / step, block), "impact_speed": speed}
 
 
-def _fluctuating_force(force: np.ndarray, seen: np.ndarray, block: int) -> dict[str, Any]:
+def _fluctuating_force(force: np.ndarray, fluid_velocity: np.ndarray, block: int) -> dict[str, Any]:
     """Deviation and autocorrelation of the force, and autocovariance of the force that the closure describes.
 
-    force  averaged over a quarter of d/w
-    seen   the same without waves as long as the box, and without the drag on a sphere's own fluctuation
+    force           averaged over a quarter of d/w
+    fluid_velocity  the same without waves as long as the box, and without the drag on a sphere's own fluctuation
     """
-    found: dict[str, Any] = {}
+    numbers: dict[str, Any] = {}
     for way, axes in (("along", slice(ALONG, None)), ("across", slice(None, ALONG))):
         squares = (force[:, :, axes] ** 2).mean(axis=(1, 2))
         covariance, scatter = autocovariance(force[:, :, axes])
-        found[f"force_deviation_{way}"] = block_root(squares, block)
-        found[f"correlation_{way}"] = _rounded(covariance / covariance[0])
-        found[f"correlation_error_{way}"] = _rounded(scatter / covariance[0])
-        found[f"seen_covariance_{way}"] = _rounded(autocovariance(seen[:, :, axes])[0])
-    return found
+        numbers[f"force_deviation_{way}"] = block_root(squares, block)
+        numbers[f"correlation_{way}"] = _rounded(covariance / covariance[0])
+        numbers[f"correlation_error_{way}"] = _rounded(scatter / covariance[0])
+        numbers[f"seen_covariance_{way}"] = _rounded(autocovariance(fluid_velocity[:, :, axes])[0])
+    return numbers
 
 
 def _rounded(values: np.ndarray) -> list[float]:
-    return [round(float(each), 5) for each in values]
+    return [round(float(number), 5) for number in values]
 
 
 def averaged(values: np.ndarray, window: int) -> np.ndarray:

@@ -25,11 +25,13 @@ def study(folder: Path, progress: Progress) -> list[Row]:
     use_threads(1)  # several studies at a time use a machine better than several threads of one
     rows = verified(folder, progress)
     kept = {matrix.name(matrix.Point(**row["point"])): row for row in stored()}
-    found = [kept.get(matrix.name(point)) or matrix.run(point, folder / "matrix", progress) for point in matrix.runs()]
-    matrix.write_table(found, folder / "table.json", matrix.MADE)
+    results = [
+        kept.get(matrix.name(point)) or matrix.run(point, folder / "matrix", progress) for point in matrix.runs()
+    ]
+    matrix.write_table(results, folder / "table.json", matrix.MADE)
     progress("pictures")
-    correlations(found, folder / "force_correlation.png")
-    return rows + [row for each in found for row in measured(each)]
+    correlations(results, folder / "force_correlation.png")
+    return rows + [row for result in results for row in measured(result)]
 
 
 def verified(folder: Path, progress: Progress) -> list[Row]:
@@ -43,7 +45,7 @@ def verified(folder: Path, progress: Progress) -> list[Row]:
             progress((part.__doc__ or "").splitlines()[0])
             with replacing(file) as fresh:
                 fresh.write_text(json.dumps([row.as_dict() for row in part()], indent=1) + "\n", encoding="utf-8")
-        rows += [_row(each) for each in json.loads(file.read_text(encoding="utf-8"))]
+        rows += [_row(row) for row in json.loads(file.read_text(encoding="utf-8"))]
     return rows
 
 

@@ -102,7 +102,7 @@ class Suspension:
         self.flow, self.diameter = flow, diameter
         fluid_mass = sphere_volume(diameter)
         self.mass, self.excess_mass = density_ratio * fluid_mass, (density_ratio - 1.0) * fluid_mass
-        self.inertia, self.excess_inertia = (0.1 * each * diameter**2 for each in (self.mass, self.excess_mass))
+        self.inertia, self.excess_inertia = (0.1 * mass * diameter**2 for mass in (self.mass, self.excess_mass))
         self.weight = np.array(weight, float)
         solid = _solid(density_ratio, diameter, contacts)
         particles = make_particles(positions, 0.5 * diameter, density_ratio, viscosity=flow.viscosity)

@@ -85,7 +85,7 @@ def approach(gaps: Sequence[float], diameter: int = 12, viscosity: float = 0.1) 
     shape = (3 * diameter, 3 * diameter, 4 * diameter)
     flow, speed = Flow(shape, viscosity), 1e-4
     motion, still = np.array([[0.0, 0.0, speed], [0.0, 0.0, -speed]]), np.zeros((2, 3))
-    found = []
+    forces = []
     for gap in gaps:
         middle = 0.5 * np.array(shape) + (0.2, 0.3, 0.1)
         lever = np.array([0.0, 0.0, 0.5 * (diameter + gap)])
@@ -96,14 +96,14 @@ def approach(gaps: Sequence[float], diameter: int = 12, viscosity: float = 0.1) 
                 flow.advance(motion, still)
             force = force_of(flow.sums(), motion, still)
             before, now = now, 0.5 * float(force[1, 2] - force[0, 2]) / (3.0 * math.pi * viscosity * diameter * speed)
-        found.append(now)
-    return found
+        forces.append(now)
+    return forces
 
 
 def cubic_arrays() -> list[Row]:
     """Simple cubic arrays in creeping flow."""
     points = [(phi, cubic_array(phi), factor) for phi, factor in ZICK_HOMSY.items()]
-    over = [(phi, found / factor, 1.0) for phi, found, factor in points]
+    over = [(phi, drag / factor, 1.0) for phi, drag, factor in points]
     return [worst("cubic arrays, Re to 0: drag over Zick & Homsy", over, 0.03)]
 
 
@@ -139,10 +139,10 @@ def random_arrays() -> list[Row]:
     """Fixed random arrays at moderate Reynolds numbers."""
     rows = []
     for phi, reynolds, seed in ((0.36, 50.0, 1), (0.2, 50.0, 1), (0.36, 15.0, 2), (0.2, 15.0, 2)):
-        found, factor = random_array(phi, reynolds, seed)
-        name = f"fixed random array, solid fraction {phi:g}, Re {found:.0f}: drag over"
-        rows.append(Row(f"{name} Tenneti et al.", factor / tenneti(found, 1.0 - phi), 1.0, 0.1))
-        rows.append(Row(f"{name} Beetstra et al.", factor / beetstra(found, 1.0 - phi), 1.0))
+        mean_reynolds, factor = random_array(phi, reynolds, seed)
+        name = f"fixed random array, solid fraction {phi:g}, Re {mean_reynolds:.0f}: drag over"
+        rows.append(Row(f"{name} Tenneti et al.", factor / tenneti(mean_reynolds, 1.0 - phi), 1.0, 0.1))
+        rows.append(Row(f"{name} Beetstra et al.", factor / beetstra(mean_reynolds, 1.0 - phi), 1.0))
     return rows
 
 
@@ -157,8 +157,8 @@ def approaching_spheres() -> list[Row]:
         for gap in gaps
     ]
     points = [
-        (gap, (exact[0] + found - grid[0] + film) / right, 1.0)
-        for gap, found, film, right in zip(gaps, grid, films, exact)
+        (gap, (exact[0] + force - grid[0] + film) / right, 1.0)
+        for gap, force, film, right in zip(gaps, grid, films, exact)
     ]
     return [worst("two spheres that approach: resistance of grid and film over the exact one", points[1:], 0.03)]
 

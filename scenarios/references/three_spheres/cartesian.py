@@ -29,18 +29,22 @@ class Conditions(Collision):
 
 
 @takes(Conditions)
-def cartesian(given: Conditions) -> list[tuple[str, int, float, float]]:
+def cartesian(conditions: Conditions) -> list[tuple[str, int, float, float]]:
     """Events of three wet spheres: kind, pair, time and speed, in the units of `simulate_three_spheres`.
 
     returns  events in their order, up to the first contact slower than 1e-3, where endless bouncing begins
     """
-    film_ratio, minimum_gap, capillary_number = given.film_ratio, given.minimum_gap, given.capillary_number
-    friction, restitution, until = given.friction, given.restitution, given.until
-    diameter, mass = 1.0 / film_ratio, 2.0 * given.stokes
-    films = {12: 1.0, 23: given.film23, 13: given.film13}
-    one, two = math.radians(given.theta12), math.radians(given.theta23)
+    film_ratio, minimum_gap, capillary_number = (
+        conditions.film_ratio,
+        conditions.minimum_gap,
+        conditions.capillary_number,
+    )
+    friction, restitution, until = conditions.friction, conditions.restitution, conditions.until
+    diameter, mass = 1.0 / film_ratio, 2.0 * conditions.stokes
+    films = {12: 1.0, 23: conditions.film23, 13: conditions.film13}
+    one, two = math.radians(conditions.theta12), math.radians(conditions.theta23)
     second = (diameter + 1.0) * np.array([math.cos(one), math.sin(one)])
-    third = second + (diameter + given.gap23) * np.array([math.cos(two), math.sin(two)])
+    third = second + (diameter + conditions.gap23) * np.array([math.cos(two), math.sin(two)])
     y = np.concatenate([[0.0, 0.0], second, third, [1.0 / math.cos(one), 0, 0, 0, 0, 0], np.zeros(3)])
     bound = {pair: _look(y, pair, diameter)[0] <= films[pair] + RIM for pair in PAIRS}
 
@@ -61,7 +65,7 @@ def cartesian(given: Conditions) -> list[tuple[str, int, float, float]]:
                 change[12 + sphere] -= 0.5 * diameter * shear / (0.1 * mass * diameter**2)
         return change
 
-    time, found = 0.0, []
+    time, events = 0.0, []
     while time < until:
         watched: list[tuple[str, int, Any]] = []
         for pair in PAIRS:
@@ -83,8 +87,8 @@ def cartesian(given: Conditions) -> list[tuple[str, int, float, float]]:
         if kind == "contact":
             y = _strike(y, pair, restitution, friction, mass, diameter)
         bound[pair] = kind != "separate"
-        found.append((kind, pair, time, abs(speed)))
-    return found
+        events.append((kind, pair, time, abs(speed)))
+    return events
 
 
 def _look(y: np.ndarray, pair: int, diameter: float) -> tuple[float, float, float, np.ndarray, np.ndarray]:

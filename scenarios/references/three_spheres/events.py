@@ -83,18 +83,24 @@ def integrate(
     """
     path = Path(state.copy(), modes.copy())
     _record(path, np.array([0.0]), path.state[:, None])
-    speed = max(1.0, *(math.hypot(each.approach, each.distance * each.turning) for each in _views(path, numbers)))
+    speed = max(
+        1.0,
+        *(
+            math.hypot(pair_view.approach, pair_view.distance * pair_view.turning)
+            for pair_view in _views(path, numbers)
+        ),
+    )
     longest = STRIDE / (numbers.film_ratio * speed)
     for _ in range(MOST_SEGMENTS):
         if path.time >= until or _flies_apart(path, numbers, until - path.time):
             return path
         _release(path, numbers)
-        found = _segment(path, numbers, until, longest, tolerance or RELATIVE)
-        _record(path, found.t[1:], found.y[:, 1:])
-        path.time, path.state = float(found.t[-1]), found.y[:, -1].copy()
-        if found.status == 1:
+        segment = _segment(path, numbers, until, longest, tolerance or RELATIVE)
+        _record(path, segment.t[1:], segment.y[:, 1:])
+        path.time, path.state = float(segment.t[-1]), segment.y[:, -1].copy()
+        if segment.status == 1:
             kind, pair = next(
-                watched for watched, times in zip(found.watched, found.t_events) if _ended(watched, times)
+                watched for watched, times in zip(segment.watched, segment.t_events) if _ended(watched, times)
             )
             _happen(path, numbers, kind, pair)
             _record(path, np.array([path.time]), path.state[:, None])
@@ -113,7 +119,7 @@ def _segment(path: Path, numbers: Numbers, until: float, longest: float, toleran
     """Integrate to the next event; the result also lists the watched events as (kind, pair)."""
     watched, flat = _watched(path, numbers), numbers.flat()
     while True:
-        found = solve_ivp(
+        segment = solve_ivp(
             lambda _, state: rates_of(state, path.modes, flat),
             (path.time, until),
             path.state,
@@ -124,14 +130,14 @@ def _segment(path: Path, numbers: Numbers, until: float, longest: float, toleran
             first_step=min(FIRST_STEP, longest, until - path.time),
             max_step=longest,
         )
-        if found.status < 0:
+        if segment.status < 0:
             raise RunFailed(
-                f"three spheres at St = {numbers.stokes:.6g} stopped at t = {found.t[-1]:.6g}: {found.message}"
+                f"three spheres at St = {numbers.stokes:.6g} stopped at t = {segment.t[-1]:.6g}: {segment.message}"
             )
-        missed = _missed(found, watched, path, numbers)
+        missed = _missed(segment, watched, path, numbers)
         if missed is None:
-            found.watched = list(watched)
-            return found
+            segment.watched = list(watched)
+            return segment
         until = missed
 
 
@@ -170,32 +176,32 @@ def _watched(path: Path, numbers: Numbers) -> dict[tuple[str, int], Any]:
     return watched
 
 
-def _missed(found: Any, watched: dict[tuple[str, int], Any], path: Path, numbers: Numbers) -> float | None:
+def _missed(segment: Any, watched: dict[tuple[str, int], Any], path: Path, numbers: Numbers) -> float | None:
     """Time of the first closest approach at which a pair passed an event undetected within one step."""
     times = []
-    for (kind, pair), at, states in zip(watched, found.t_events, found.y_events):
+    for (kind, pair), at, states in zip(watched, segment.t_events, segment.y_events):
         if kind != CLOSEST or not len(at):
             continue
         least = numbers.films[pair] if path.modes[pair] == APART else numbers.minimum_gap
         gaps = np.array([view(state, numbers.film_ratio, pair).gap for state in states])
-        times += [time for time, gap in zip(at, gaps) if gap < least - TOUCH and path.time < time < found.t[-1]]
+        times += [time for time, gap in zip(at, gaps) if gap < least - TOUCH and path.time < time < segment.t[-1]]
     return min(times, default=None)
 
 
 def _happen(path: Path, numbers: Numbers, kind: str, pair: int) -> None:
     """Apply an event and the contacts that follow from it immediately."""
-    seen = view(path.state, numbers.film_ratio, pair)
+    pair_view = view(path.state, numbers.film_ratio, pair)
     if kind == CONTACT:
         _place(path, pair, numbers.minimum_gap)
-        if seen.approach > STILL:
-            path.events.append((kind, pair, path.time, seen.approach))
-        _touch(path, numbers, pair, seen.approach)
+        if pair_view.approach > STILL:
+            path.events.append((kind, pair, path.time, pair_view.approach))
+        _touch(path, numbers, pair, pair_view.approach)
     elif kind == RELEASE:
         path.modes[pair] = JOINED
     else:
         _place(path, pair, numbers.films[pair])
         path.modes[pair] = JOINED if kind == MEET else APART
-        path.events.append((kind, pair, path.time, abs(seen.approach)))
+        path.events.append((kind, pair, path.time, abs(pair_view.approach)))
     _touch_others(path, numbers)
 
 
@@ -213,9 +219,9 @@ def _touch_others(path: Path, numbers: Numbers) -> None:
     for _ in range(300):
         still = True
         for pair in range(3):
-            mode, seen = path.modes[pair], view(path.state, numbers.film_ratio, pair)
-            resting, speed = mode == RESTING, seen.approach
-            touching = resting or (mode == JOINED and seen.gap - numbers.minimum_gap < TOUCH)
+            mode, pair_view = path.modes[pair], view(path.state, numbers.film_ratio, pair)
+            resting, speed = mode == RESTING, pair_view.approach
+            touching = resting or (mode == JOINED and pair_view.gap - numbers.minimum_gap < TOUCH)
             if touching and (speed > STILL or (resting and -numbers.slowest_bounce < speed < -STILL)):
                 if not resting:
                     path.events.append((CONTACT, pair, path.time, speed))
@@ -240,11 +246,11 @@ def _flies_apart(path: Path, numbers: Numbers, remaining: float) -> bool:
     """Whether all films are apart and free flight brings no two spheres together in the time that remains."""
     if (path.modes != APART).any():
         return False
-    for seen, film in zip(_views(path, numbers), numbers.films):
-        across = seen.distance * seen.turning
-        speed, reach = math.hypot(seen.approach, across), 1.0 / numbers.film_ratio + film
-        passes = seen.distance * abs(across) >= reach * speed
-        if seen.approach > 0.0 and not passes and seen.distance - reach < speed * remaining:
+    for pair_view, film in zip(_views(path, numbers), numbers.films):
+        across = pair_view.distance * pair_view.turning
+        speed, reach = math.hypot(pair_view.approach, across), 1.0 / numbers.film_ratio + film
+        passes = pair_view.distance * abs(across) >= reach * speed
+        if pair_view.approach > 0.0 and not passes and pair_view.distance - reach < speed * remaining:
             return False
     return True
 

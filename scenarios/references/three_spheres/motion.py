@@ -85,17 +85,17 @@ def view(state, film_ratio, pair):
 
 
 @serial
-def slip(state, film_ratio, pair, seen):
+def slip(state, film_ratio, pair, pair_view):
     """Sliding speed of the surface of the first sphere relative to the second."""
     spins = state[SPINS + FIRST[pair]] + state[SPINS + SECOND[pair]]
-    return -seen.distance * seen.turning + 0.5 / film_ratio * spins
+    return -pair_view.distance * pair_view.turning + 0.5 / film_ratio * spins
 
 
 @serial
-def along(seen, other, push, drag):
+def along(own, other, push, drag):
     """Component along the line of centres of a pair of a force given along and across that of another pair."""
-    cosine = seen.cosine * other.cosine + seen.sine * other.sine
-    sine = seen.cosine * other.sine - seen.sine * other.cosine
+    cosine = own.cosine * other.cosine + own.sine * other.sine
+    sine = own.cosine * other.sine - own.sine * other.cosine
     return push * cosine - drag * sine
 
 
@@ -110,11 +110,11 @@ def forces(state, modes, numbers):
     for pair in range(3):
         if modes[pair] == APART:
             continue
-        seen, film = views[pair], numbers.films[pair]
-        sliding = slip(state, h_a, pair, seen)
+        pair_view, film = views[pair], numbers.films[pair]
+        sliding = slip(state, h_a, pair, pair_view)
         # only trial steps reach below the minimum gap or beyond the film
-        gap = min(film, max(seen.gap, 0.5 * numbers.minimum_gap))
-        push[pair] = seen.approach * deforming_share(gap, film) / gap - numbers.pull
+        gap = min(film, max(pair_view.gap, 0.5 * numbers.minimum_gap))
+        push[pair] = pair_view.approach * deforming_share(gap, film) / gap - numbers.pull
         # the strength A = 6 pi eta R*^2 is 1 in these units
         drag[pair] = sliding * davis_tangential(1.0, reduced_radius, gap, film) / (6.0 * math.pi * reduced_radius**2)
         if modes[pair] == RESTING:
@@ -152,17 +152,17 @@ def rates(state, modes, numbers):
     push, drag, _ = forces(state, modes, numbers)
     slopes = np.zeros(STATE)
     for row in range(2):
-        seen, at = views[row], 4 * row
+        pair_view, at = views[row], 4 * row
         normal = tangential = 0.0
         for pair in range(3):
             share = COUPLING[row, pair] / mass
-            normal += share * along(seen, views[pair], push[pair], drag[pair])
-            tangential += share * along(seen, views[pair], drag[pair], -push[pair])
-        slopes[at + 1] = seen.turning
-        slopes[at + 3] = (tangential + 2.0 * seen.approach * seen.turning) / seen.distance
+            normal += share * along(pair_view, views[pair], push[pair], drag[pair])
+            tangential += share * along(pair_view, views[pair], drag[pair], -push[pair])
+        slopes[at + 1] = pair_view.turning
+        slopes[at + 3] = (tangential + 2.0 * pair_view.approach * pair_view.turning) / pair_view.distance
         if modes[row] != RESTING:
-            slopes[at] = -seen.approach
-            slopes[at + 2] = -normal - seen.distance * seen.turning**2
+            slopes[at] = -pair_view.approach
+            slopes[at + 2] = -normal - pair_view.distance * pair_view.turning**2
     for pair in range(3):
         turn = radius * drag[pair] / (0.4 * mass * radius**2)
         slopes[SPINS + FIRST[pair]] -= turn
@@ -179,13 +179,13 @@ def rates_of(state, modes, flat):
 @serial
 def observe(state, modes, flat):
     """Gap, approach speed and contact force of each pair (3, 3), given `Numbers.flat()`."""
-    numbers, found = _numbers(flat), np.zeros((3, 3))
+    numbers, table = _numbers(flat), np.zeros((3, 3))
     for pair in range(3):
-        seen = view(state, numbers.film_ratio, pair)
-        found[0, pair], found[1, pair] = seen.gap, seen.approach
+        pair_view = view(state, numbers.film_ratio, pair)
+        table[0, pair], table[1, pair] = pair_view.gap, pair_view.approach
     if (modes == RESTING).any():
-        found[2] = forces(state, modes, numbers)[2]
-    return found
+        table[2] = forces(state, modes, numbers)[2]
+    return table
 
 
 @serial
@@ -198,13 +198,13 @@ def strike(state, numbers, pair, restitution):
     """Apply the impulse of a hard contact with sliding friction, or without sliding where friction suffices."""
     h_a = numbers.film_ratio
     mass, radius = 2.0 * numbers.stokes, 0.5 / h_a
-    seen = view(state, h_a, pair)
-    sliding = slip(state, h_a, pair, seen)
-    normal = 0.5 * mass * (1.0 + restitution) * seen.approach
+    pair_view = view(state, h_a, pair)
+    sliding = slip(state, h_a, pair, pair_view)
+    normal = 0.5 * mass * (1.0 + restitution) * pair_view.approach
     limit = numbers.friction * max(normal, 0.0)
     tangential = min(limit, max(-limit, mass * sliding / 7.0))
-    x = normal * seen.cosine - tangential * seen.sine
-    y = normal * seen.sine + tangential * seen.cosine
+    x = normal * pair_view.cosine - tangential * pair_view.sine
+    y = normal * pair_view.sine + tangential * pair_view.cosine
     for row in range(2):
         share = COUPLING[row, pair] / mass
         moved = view(state, h_a, row)

@@ -263,7 +263,7 @@ def integrate(wet: Wet, speed: float, along: float, spin: float, tolerance: floa
         longest = LONGEST
         if phase == "II":
             longest = BOUNCES * timescales.hertz_time(wet.mass, wet.stiffness, -float(state[SPEED]))
-        found = solve_ivp(
+        solution = solve_ivp(
             rates(wet, phase),
             (time, time + longest),
             state,
@@ -272,14 +272,14 @@ def integrate(wet: Wet, speed: float, along: float, spin: float, tolerance: floa
             atol=tolerance * _SCALE,
             events=stops,
         )
-        if found.status < 0 or not np.isfinite(found.y[:, -1]).all():
-            raise RunFailed(f"phase {phase} of a wet impact at {speed:g} m/s stopped: {found.message}")
-        times.append(found.t)
-        states.append(found.y)
-        phases.append(np.full(len(found.t), PHASES.index(phase) + 1))
-        time, state = float(found.t[-1]), found.y[:, -1].copy()
+        if solution.status < 0 or not np.isfinite(solution.y[:, -1]).all():
+            raise RunFailed(f"phase {phase} of a wet impact at {speed:g} m/s stopped: {solution.message}")
+        times.append(solution.t)
+        states.append(solution.y)
+        phases.append(np.full(len(solution.t), PHASES.index(phase) + 1))
+        time, state = float(solution.t[-1]), solution.y[:, -1].copy()
         ends[phase] = time
-        if not found.t_events[0].size:
+        if not solution.t_events[0].size:
             return Path(np.concatenate(times), np.hstack(states), np.concatenate(phases), ends, True)
     if not dry and bridge(toroid_of(wet), state[HEIGHT]).azimuthal <= NECK * wet.radius:
         raise RunFailed(

@@ -127,11 +127,11 @@ def boxes(folder: Path, progress: Progress) -> Iterator[Row]:
 
 
 def _compared(
-    name: str, found: list[dict[str, Any]], rows: list[dict[str, Any]], limit: float | None, remark: str
+    name: str, results: list[dict[str, Any]], rows: list[dict[str, Any]], limit: float | None, remark: str
 ) -> Iterator[Row]:
     """Means of the unresolved model over those of the resolved runs."""
     for quantity, key in COMPARED.items():
-        model, resolved = (float(np.mean([_value(each[key]) for each in some])) for some in (found, rows))
+        model, resolved = (float(np.mean([_value(row[key]) for row in some])) for some in (results, rows))
         note = f"{model:.3g} for {resolved:.3g}, {len(rows)} seeds{remark}"
         yield Row(f"{name}: {quantity}", model / resolved, 1.0, limit, note=note)
 
@@ -140,8 +140,8 @@ def _box(folder: Path, row: dict[str, Any], ending: str = "", **changes: Any) ->
     """What the unresolved model gives in the box of a resolved run, with further keys of the case."""
 
     def compute() -> dict[str, Any]:
-        found = run(row, **changes)
-        return {name: found[name] for name in KEPT}
+        results = run(row, **changes)
+        return {name: results[name] for name in KEPT}
 
     return kept(folder / f"box-{matrix.name(Point(**row['point']))}{ending}.json", compute)
 
@@ -185,16 +185,16 @@ def _packings(name: str, beds: list[FluidisedBed]) -> Iterator[Row]:
     """Means of several packings with their standard errors; the limits hold for the means."""
 
     def mean(quantity: str) -> tuple[float, str]:
-        values = [getattr(each, quantity) for each in beds]
+        values = [getattr(bed, quantity) for bed in beds]
         error = float(np.std(values, ddof=1)) / math.sqrt(len(values))
         return float(np.mean(values)), f"{len(values)} seeds, standard error {error:.2g}"
 
-    known, (voidage, note) = beds[0], mean("voidage")
-    yield Row(f"{name}: voidage", voidage, known.balance, 0.02, note=f"balance of weight and drag; {note}")
-    nearest = min(max(voidage, known.lowest), known.highest)
-    spread = f"published laws: {known.lowest:.3f} to {known.highest:.3f}"
+    first, (voidage, note) = beds[0], mean("voidage")
+    yield Row(f"{name}: voidage", voidage, first.balance, 0.02, note=f"balance of weight and drag; {note}")
+    nearest = min(max(voidage, first.lowest), first.highest)
+    spread = f"published laws: {first.lowest:.3f} to {first.highest:.3f}"
     yield Row(f"{name}: voidage outside of the published laws", abs(voidage - nearest), 0.0, 0.0, note=spread)
-    yield Row(f"{name}: voidage of the layers inside", mean("inside")[0], known.balance, note=mean("inside")[1])
+    yield Row(f"{name}: voidage of the layers inside", mean("inside")[0], first.balance, note=mean("inside")[1])
     layers, note = mean("layers")
     yield Row(f"{name}: deviation of layers in time", layers, 0.0, 0.03, note=f"layers of 2.5 d; {note}")
     carried, note = mean("carried")
@@ -220,24 +220,24 @@ MARKS = {"1.03": ("o", BLUE), "2.5": ("s", ORANGE), "3.6": ("D", GREEN), "7": ("
 def figure(rows: list[dict[str, Any]], path: Path) -> None:
     """Ratio of the unresolved to the resolved value against the solid fraction; hollow points were fitted."""
     drawn, axes = blank(1, len(QUANTITIES), width=9.0, height=4.0, sharey=True)
-    for each, quantity in zip(axes, QUANTITIES):
-        each.axhspan(0.7, 1.3, color="#eeeeee", zorder=0)
-        each.axhline(1.0, color="black", lw=1.0)
-        each.set_xlim(0.15, 0.57)
-        each.set_yscale("log")
-        each.set_yticks([0.5, 0.7, 1.0, 1.3, 1.7], ["0.5", "0.7", "1", "1.3", "1.7"])
-        each.minorticks_off()
-        label(each, "solid fraction", "-", "unresolved over resolved" if each is axes[0] else "", "-", quantity)
+    for axis, quantity in zip(axes, QUANTITIES):
+        axis.axhspan(0.7, 1.3, color="#eeeeee", zorder=0)
+        axis.axhline(1.0, color="black", lw=1.0)
+        axis.set_xlim(0.15, 0.57)
+        axis.set_yscale("log")
+        axis.set_yticks([0.5, 0.7, 1.0, 1.3, 1.7], ["0.5", "0.7", "1", "1.3", "1.7"])
+        axis.minorticks_off()
+        label(axis, "solid fraction", "-", "unresolved over resolved" if axis is axes[0] else "", "-", quantity)
     axes[1].set_ylabel("")
     axes[2].set_ylabel("")
     for row in rows:
-        if found := POINT.match(row["quantity"]):
-            marker, colour = MARKS[found[1]]
+        if point := POINT.match(row["quantity"]):
+            marker, colour = MARKS[point[1]]
             face = "white" if row["verdict"] == "report" else colour
-            panel, place = axes[QUANTITIES.index(found[4])], (float(found[2]), row["value"])
+            panel, place = axes[QUANTITIES.index(point[4])], (float(point[2]), row["value"])
             panel.plot(*place, marker, color=colour, mfc=face, mew=1.6, ms=8)
-            if found[3]:
-                panel.annotate(f"$Re_m$ {found[3]}", place, (6, -3), textcoords="offset points", fontsize="small")
+            if point[3]:
+                panel.annotate(f"$Re_m$ {point[3]}", place, (6, -3), textcoords="offset points", fontsize="small")
     for ratio, (marker, colour) in MARKS.items():
         axes[0].plot([], [], marker, color=colour, ms=8, label=f"density ratio {ratio}")
     axes[0].plot([], [], "o", color="black", mfc="white", mew=1.6, ms=8, label="hollow: fitted")
@@ -284,7 +284,7 @@ def case_of(point: Point, row: dict[str, Any], **changes: Any) -> Case:
             }
         },
         column={"width": side, "height": side, "cell": side / 3.0, "sides": "periodic", "ends": "periodic"},
-        bed={"diameter": d, "start": "placed", "positions": [tuple(each) for each in places.tolist()]},
+        bed={"diameter": d, "start": "placed", "positions": [tuple(place) for place in places.tolist()]},
         laws={
             "drag": "tenneti",
             "agitation": "free_spheres",

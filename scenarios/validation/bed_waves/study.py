@@ -194,8 +194,8 @@ def study(folder: Path, progress: Progress) -> list[Row]:
         cases = [box(wavelength, cell=cell, seed=seed, **changes) for seed in SEEDS]
         waves = [single_wave(case, wavelength) for case in cases]
         rows += _rows(name, cases[0], wavelength, waves)
-        for seed, each in zip(SEEDS, waves):
-            curves[f"{name}, seed {seed}"] = {"time": (each.time, "s"), "amplitude": (each.amplitude, "-")}
+        for seed, wave in zip(SEEDS, waves):
+            curves[f"{name}, seed {seed}"] = {"time": (wave.time, "s"), "amplitude": (wave.amplitude, "-")}
     write_histories(folder / "histories.h5", curves)
     draw(folder / "waves.png", curves)
     return rows
@@ -204,12 +204,12 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 def _rows(name: str, case: Case, wavelength: float, waves: list[Measured]) -> list[Row]:
     """Rows of one comparison: with agitation the wave must not grow."""
     growth, speed, temperature = (
-        float(np.mean([getattr(each, part) for each in waves])) for part in ("growth", "speed", "granular_temperature")
+        float(np.mean([getattr(wave, part) for wave in waves])) for part in ("growth", "speed", "granular_temperature")
     )
-    spread = float(np.std([each.growth for each in waves], ddof=1) / math.sqrt(len(waves)))
+    spread = float(np.std([wave.growth for wave in waves], ddof=1) / math.sqrt(len(waves)))
     note = f"mean of {len(waves)} seeds, standard error {spread:.2g}"
     bed = theory(case)
-    expected, later = bed.wave(wavelength), float(np.mean([each.later for each in waves]))
+    expected, later = bed.wave(wavelength), float(np.mean([wave.later for wave in waves]))
     if case.agitation != "none":
         agitated = with_agitation(bed, case)
         estimate = agitated.granular_temperature

@@ -81,8 +81,8 @@ class Run(NamedTuple):
 
 def points() -> list[Point]:
     """All points: without agitation, then those within the range of agitation with it."""
-    even = [Point(*each) for each in itertools.product(STOKES, SOLID_FRACTIONS, DENSITY_RATIOS)]
-    return even + [each._replace(agitated=True) for each in even if is_corner(each) and is_in_range(each)]
+    even = [Point(*values) for values in itertools.product(STOKES, SOLID_FRACTIONS, DENSITY_RATIOS)]
+    return even + [point._replace(agitated=True) for point in even if is_corner(point) and is_in_range(point)]
 
 
 def is_corner(point: Point) -> bool:
@@ -101,9 +101,9 @@ def plan() -> Iterator[Run]:
 
     The coarse design with two seeds, its agitated beds, the third seed, soft spheres, all other points.
     """
-    corners = [each for each in points() if is_corner(each)]
-    even, agitated = ([each for each in corners if each.agitated == moved] for moved in (False, True))
-    others = [each for each in points() if not is_corner(each)]
+    corners = [point for point in points() if is_corner(point)]
+    even, agitated = ([corner for corner in corners if corner.agitated == moved] for moved in (False, True))
+    others = [point for point in points() if not is_corner(point)]
     first = (DRY, "smooth", "rough")
     for chosen, films, seeds in (
         (even, first, SEEDS[:2]),

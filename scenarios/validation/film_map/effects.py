@@ -63,28 +63,31 @@ def estimate(values: Sequence[float]) -> Estimate:
     return Estimate(float(np.mean(values)), error, count)
 
 
-def change(beds: Beds, point: Point, film: str, what: str) -> Estimate | None:
+def change(beds: Beds, point: Point, film: str, measure: str) -> Estimate | None:
     """Relative change by a film, seed by seed; None where no seed has both beds."""
     changes = [
-        means[what] / dry[what] - 1.0
+        means[measure] / dry[measure] - 1.0
         for run, means in beds.items()
         if (run.point, run.film) == (point, film)
         and (dry := beds.get(run._replace(film=DRY))) is not None
-        and what in means and dry.get(what, 0.0) != 0.0
+        and measure in means and dry.get(measure, 0.0) != 0.0
     ]  # fmt: skip
     return estimate(changes) if changes else None
 
 
-def mean(beds: Beds, point: Point, film: str, what: str) -> Estimate | None:
+def mean(beds: Beds, point: Point, film: str, measure: str) -> Estimate | None:
     """Mean over the seeds; None where there is none."""
-    values = [means[what] for run, means in beds.items() if (run.point, run.film) == (point, film) and what in means]
+    values = [
+        means[measure] for run, means in beds.items() if (run.point, run.film) == (point, film) and measure in means
+    ]
     return estimate(values) if values else None
 
 
 def compared(beds: Beds) -> list[tuple[Point, str]]:
     """Points and films of which some seed has both beds, in the order of the design."""
-    found = {(run.point, run.film) for run in beds if run.film != DRY and run._replace(film=DRY) in beds}
-    return sorted(found, key=lambda each: (each[0].agitated, each[0], list(ROUGHNESS).index(each[1])))
+    pairs = {(run.point, run.film) for run in beds if run.film != DRY and run._replace(film=DRY) in beds}
+    roughness = list(ROUGHNESS)
+    return sorted(pairs, key=lambda pair: (pair[0].agitated, pair[0], roughness.index(pair[1])))
 
 
 # ---------------------------------------------------------------- files
@@ -92,12 +95,12 @@ def compared(beds: Beds) -> list[tuple[Point, str]]:
 
 def finished_beds(home: Path) -> Beds:
     """The means of all finished beds."""
-    found: Beds = {}
+    beds: Beds = {}
     for run in plan():
         path = home / f"{run.name}.json"
         if path.exists():
-            found[run] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+            beds[run] = json.loads(path.read_text(encoding="utf-8"))
+    return beds
 
 
 _KEYS = ("stokes_terminal", "solid_fraction", "density_ratio", "agitated", "film", "seed")
@@ -123,18 +126,18 @@ def write_beds(beds: Beds, path: Path) -> None:
             numbers = (*described, *(means.get(name, math.nan) for name in UNITS))
             point = run.point
             out.writerow([
-                *(f"{each:g}" for each in point[:3]), int(point.agitated), run.film, run.seed,
-                *("" if math.isnan(each) else f"{each:.6g}" for each in numbers),
+                *(f"{number:g}" for number in point[:3]), int(point.agitated), run.film, run.seed,
+                *("" if math.isnan(number) else f"{number:.6g}" for number in numbers),
             ])  # fmt: skip
 
 
 def read_beds(lines: Iterable[str]) -> Beds:
     """Beds from the lines of such a file."""
-    found: Beds = {}
+    beds: Beds = {}
     for row in csv.DictReader(lines):
         values = {name.split(" [")[0]: text for name, text in row.items()}
         stokes, solid_fraction, density_ratio = (float(values[name]) for name in _KEYS[:3])
         point = Point(stokes, solid_fraction, density_ratio, values["agitated"] == "1")
         run = Run(point, values["film"], int(values["seed"]))
-        found[run] = {name: float(values[name]) for name in UNITS if values[name]}
-    return found
+        beds[run] = {name: float(values[name]) for name in UNITS if values[name]}
+    return beds

@@ -41,10 +41,10 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
     """
     use_threads(1)
     end = monotonic() + 3600.0 * hours
-    for each in plan():
+    for run in plan():
         if monotonic() >= end:
             break
-        advance(folder / "runs", each, progress)
+        advance(folder / "runs", run, progress)
     beds = effects.finished_beds(folder / "runs")
     effects.write_beds(beds, folder / "beds.csv")
     draw(beds, folder / "map.png")
@@ -60,20 +60,22 @@ def advance(home: Path, run: Run, progress: Progress) -> None:
 
 def rows(beds: Beds) -> list[Row]:
     """Changes by films with errors, shares of beds with films, and the balance of energy."""
-    made = []
+    table = []
     for point, film in effects.compared(beds):
-        for what, words in (CHANGED | OF_FILMS).items():
-            changed = what in CHANGED
-            found = (effects.change if changed else effects.mean)(beds, point, film, what)
-            if found is not None:
-                note = "one seed" if found.seeds == 1 else f"standard error {found.error:.2g} over {found.seeds} seeds"
+        for measure, words in (CHANGED | OF_FILMS).items():
+            changed = measure in CHANGED
+            effect = (effects.change if changed else effects.mean)(beds, point, film, measure)
+            if effect is not None:
+                note = (
+                    "one seed" if effect.seeds == 1 else f"standard error {effect.error:.2g} over {effect.seeds} seeds"
+                )
                 words = f"{words}, relative change by films" if changed else words
-                made.append(Row(f"{point.name}, {film}: {words}", found.value, note=note))
+                table.append(Row(f"{point.name}, {film}: {words}", effect.value, note=note))
     if beds:
         largest = max(means["largest_remainder"] for means in beds.values())
         words = f"energy that the ledgers of {len(beds)} beds leave unexplained, over the dissipation"
-        made.append(Row(words, largest, 0.0, REMAINDER))
-    return made
+        table.append(Row(words, largest, 0.0, REMAINDER))
+    return table
 
 
 def _means(home: Path, run: Run, progress: Progress) -> dict[str, float]:
@@ -95,26 +97,26 @@ def means_of(data: RunData, run: Run) -> dict[str, float]:
     begin, end = window_of(data, case)
     inside = data.history["time"] >= begin
     of_bed = outcome(data, case)
-    found = {name: getattr(of_bed, name) for name in ("bed_height", "granular_temperature", "collisions", "contacts")}
-    found |= {name: getattr(of_bed, name) for name in ("stokes", "solids_meet")}
+    numbers = {name: getattr(of_bed, name) for name in ("bed_height", "granular_temperature", "collisions", "contacts")}
+    numbers |= {name: getattr(of_bed, name) for name in ("stokes", "solids_meet")}
     history = {
         "voidage": "bed_voidage",
         "temperature_along": "granular_temperature_along",
         "temperature_across": "granular_temperature_across",
     }
-    found |= {name: float(np.nanmean(data.history[column][inside])) for name, column in history.items()}
+    numbers |= {name: float(np.nanmean(data.history[column][inside])) for name, column in history.items()}
     rows = {name: column[data.collisions["end"] >= begin] for name, column in data.collisions.items()}
     films = np.isfinite(rows["stokes"]) & (rows["stokes"] > 0.0)
     if films.any():
-        found["approaches"] = 2.0 * float(rows["weight"][films].sum()) / (case.particle_count * (end - begin))
-        found["gap_ratio"] = float(np.median((rows["elastohydrodynamic_gap"] / rows["roughness_gap"])[films]))
+        numbers["approaches"] = 2.0 * float(rows["weight"][films].sum()) / (case.particle_count * (end - begin))
+        numbers["gap_ratio"] = float(np.median((rows["elastohydrodynamic_gap"] / rows["roughness_gap"])[films]))
     lost = {name: np.ptp(data.history[f"energy_{name}"][inside][[0, -1]]) for name in LOST if _is_in(data, name)}
     by_collisions = sum(lost[name] for name in OF_COLLISIONS if name in lost)
-    found["dissipated"] = float(by_collisions / sum(lost.values()))
-    found["dissipation"] = float(by_collisions) / (case.particle_count * (end - begin))
-    found["largest_remainder"] = float(np.abs(data.history["energy_remainder"]).max() / sum(lost.values()))
-    found["stokes_of_fluctuations"] = stokes_of(case, math.sqrt(found["granular_temperature"]))
-    return {name: value for name, value in found.items() if math.isfinite(value)}
+    numbers["dissipated"] = float(by_collisions / sum(lost.values()))
+    numbers["dissipation"] = float(by_collisions) / (case.particle_count * (end - begin))
+    numbers["largest_remainder"] = float(np.abs(data.history["energy_remainder"]).max() / sum(lost.values()))
+    numbers["stokes_of_fluctuations"] = stokes_of(case, math.sqrt(numbers["granular_temperature"]))
+    return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
 
 def _is_in(data: RunData, line: str) -> bool:
@@ -141,30 +143,30 @@ MARKS = dict(zip(ROUGHNESS, "osD"))
 def draw(beds: Beds, path: Path) -> None:
     """Changes by films, and shares, against the median Stokes number of the collisions."""
     figure, axes = blank(2, 3, width=11.0, height=7.2)
-    for each, (what, (title, name, unit)) in zip(axes, PANELS.items()):
-        factor, none = (1.0, 1.0) if what == "dissipation" else (100.0, 0.0)
+    for panel, (measure, (title, name, unit)) in zip(axes, PANELS.items()):
+        factor, none = (1.0, 1.0) if measure == "dissipation" else (100.0, 0.0)
         for point, film in compared(beds):
             stokes = mean(beds, point, film, "stokes")
-            shown = (change if what in CHANGED else mean)(beds, point, film, what)
+            shown = (change if measure in CHANGED else mean)(beds, point, film, measure)
             if stokes is not None and shown is not None:
-                each.errorbar(
+                panel.errorbar(
                     stokes.value, none + factor * shown.value, _error(shown, factor), _error(stokes, 1.0),
                     **_style(point.solid_fraction, point.density_ratio, film, point.agitated),
                 )  # fmt: skip
-        if what in CHANGED:
-            each.axhline(none, color="0.4", linewidth=0.8, zorder=0)
-        each.set_xscale("log")
-        if what == "dissipation":
-            each.set_yscale("log")
-            each.yaxis.set_major_formatter("{x:g}")
-            each.yaxis.set_minor_formatter("{x:g}")
-        label(each, "median St of the collisions", "-", name, unit, title)
+        if measure in CHANGED:
+            panel.axhline(none, color="0.4", linewidth=0.8, zorder=0)
+        panel.set_xscale("log")
+        if measure == "dissipation":
+            panel.set_yscale("log")
+            panel.yaxis.set_major_formatter("{x:g}")
+            panel.yaxis.set_minor_formatter("{x:g}")
+        label(panel, "median St of the collisions", "-", name, unit, title)
     _explain(axes[-1], beds)
     save(figure, path)
 
 
-def _error(found: Estimate, factor: float) -> float | None:
-    return None if math.isnan(found.error) else factor * found.error
+def _error(effect: Estimate, factor: float) -> float | None:
+    return None if math.isnan(effect.error) else factor * effect.error
 
 
 def _style(solid_fraction: float, density_ratio: float, film: str, agitated: bool) -> dict[str, Any]:
@@ -187,7 +189,7 @@ def _explain(axes: Any, beds: Beds) -> None:
                 style = _style(solid_fraction, density_ratio, next(iter(MARKS)), False)
                 axes.errorbar([], [], **style, label=f"density ratio {density_ratio:g}, {solid_fraction:g} solids")
     for film, roughness in ROUGHNESS.items():
-        if any(each == film for _, each in shown):
+        if any(other == film for _, other in shown):
             style = {"fmt": MARKS[film], "color": "0.3", "label": f"{film}: roughness {roughness / 5e-4:g} R*"}
             style["label"] += ", deformed" if film == "soft" else ""
             axes.errorbar([], [], **style, linewidth=1.0)

@@ -23,21 +23,21 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 def drying(curves: Curves) -> list[Row]:
     """The drying bed of the gallery, beside the balance of heat and water."""
-    found, expected = drying_bed.drying(drying_bed.case())
+    bed, expected = drying_bed.drying(drying_bed.case())
     rate, leaves, plateau = (
-        found.mean(each, 0.2, 0.5) for each in (found.rate, found.by_air, found.temperature)
+        bed.mean(series, 0.2, 0.5) for series in (bed.rate, bed.by_air, bed.temperature)
     )  # of the constant rate
     curves["drying bed"] = {
-        "time": (found.time, "s"), "water": (found.water, "-"), "rate": (found.rate, "kg/s"),
-        "by air": (found.by_air, "kg/s"), "temperature": (found.temperature, "K"),
+        "time": (bed.time, "s"), "water": (bed.water, "-"), "rate": (bed.rate, "kg/s"),
+        "by air": (bed.by_air, "kg/s"), "temperature": (bed.temperature, "K"),
     }  # fmt: skip
     note = "seeds at the floor dry first, and the air then leaves unsaturated"
     return [
         Row("drying bed: rate over that of the air that leaves, 0.2 to 0.5 s", rate / leaves, 1.0, 0.01),
         Row("drying bed: rate over that of the balance, 0.2 to 0.5 s", rate / expected.rate, 1.0, 0.01),
         Row("drying bed: plateau, balance", plateau, expected.temperature, 0.3, "K"),
-        Row("drying bed: end of drying over that of the balance", found.end / expected.end, 1.0, 0.02, note=note),
-        Row("drying bed: imbalance of heat, vapour and liquid", found.imbalance, 0.0, 1e-9),
+        Row("drying bed: end of drying over that of the balance", bed.end / expected.end, 1.0, 0.02, note=note),
+        Row("drying bed: imbalance of heat, vapour and liquid", bed.imbalance, 0.0, 1e-9),
     ]
 
 
@@ -77,25 +77,25 @@ def history(case: Case, every: float = 0.02) -> dict[str, np.ndarray]:
     while simulation.time < case.run.until - 1e-9:
         simulation.until(simulation.time + every)
         rows.append(row(simulation))
-    return {name: np.array([each[name] for each in rows]) for name in rows[0]}
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def stuck(curves: Curves) -> list[Row]:
     """A wet bed that stands still: it fluidises again when it is dry, and does not with solid bonds."""
-    rows, dry, found = [], {}, {}
+    rows, dry, by_name = [], {}, {}
     joined = {"without bonds": (0.0, 0.033), "with bonds": (1.0, 0.07)}  # expected, and limit
     for name in joined:
-        found[name] = each = history(sticky_case(bonds=name == "with bonds"))
+        by_name[name] = columns = history(sticky_case(bonds=name == "with bonds"))
         units = {"time": "s", "granular_temperature": "m2/s2", "liquid_in_bridges": "m3", "largest_agglomerate": "-"}
-        curves[f"dried bed, {name}"] = {column: (each[column], unit) for column, unit in units.items()}
-        still, end = ((each["time"] > begin) & (each["time"] <= last) for begin, last in (STILL, DRY))
-        motion, largest = each["granular_temperature"], each["largest_agglomerate"] / COUNT
+        curves[f"dried bed, {name}"] = {column: (columns[column], unit) for column, unit in units.items()}
+        still, end = ((columns["time"] > begin) & (columns["time"] <= last) for begin, last in (STILL, DRY))
+        motion, largest = columns["granular_temperature"], columns["largest_agglomerate"] / COUNT
         dry[name] = float(motion[end].mean())
         rows += [
             Row(f"bed while wet, {name}: granular temperature", float(motion[still].max()), 0.0, 1e-6, "m2/s2"),
             Row(f"bed while wet, {name}: largest agglomerate over all", float(largest[still].min()), 1.0, 0.07),
             Row(f"bed when dry, {name}: largest agglomerate over all", float(largest[-1]), *joined[name]),
-            Row(f"bed, {name}: imbalance of liquid", float(each["liquid_imbalance"].max()), 0.0, 1e-12),
+            Row(f"bed, {name}: imbalance of liquid", float(columns["liquid_imbalance"].max()), 0.0, 1e-12),
         ]
     moves = min(dry["without bonds"] / 5e-4, 1.0)  # more than this passes, too
     bonded = dry["with bonds"] / dry["without bonds"]
@@ -103,7 +103,7 @@ def stuck(curves: Curves) -> list[Row]:
         *rows,
         Row("bed when dry: granular temperature in 5e-4 m2/s2, at most 1", moves, 1.0, 0.0),
         Row("bed when dry: granular temperature with bonds over that without", bonded, 0.0, 0.02),
-        Row("bed when dry: bonds per seed", float(found["with bonds"]["bond_count"][-1]) / COUNT),
+        Row("bed when dry: bonds per seed", float(by_name["with bonds"]["bond_count"][-1]) / COUNT),
     ]
 
 
@@ -117,8 +117,8 @@ def _draw(folder: Path, curves: Curves) -> None:
         axes[1].semilogy(time, np.maximum(run["granular_temperature"], 1e-12), color=colour)
         axes[2].plot(time, run["largest_agglomerate"] / COUNT, color=colour)
         dry = time[run["liquid_in_bridges"] <= 1e-3 * run["liquid_in_bridges"].max()]
-        for each in axes if dry.size else ():
-            each.axvline(dry[0], color=GREY, ls=":", lw=1.0)
+        for panel in axes if dry.size else ():
+            panel.axvline(dry[0], color=GREY, ls=":", lw=1.0)
     label(axes[0], "time", "ms", "liquid in bridges", "mm3")
     label(axes[1], "time", "ms", "granular temperature", "m2/s2")
     label(axes[2], "time", "ms", "largest agglomerate over all seeds", "-")

@@ -53,20 +53,22 @@ def hot_bed(curves: Curves) -> list[Row]:
     assert fluid and heat.cells is not None
     flow = fluid.density * SPEED * simulation.case.column.floor_area * HEAT["fluid_heat_capacity"]
     air = (fluid.density, HEAT["fluid_heat_capacity"], HEAT["conductivity"], fluid.viscosity)
-    in_cells, in_layers = (TwoPhaseBalance(simulation, air, CAPACITY, INLET, each) for each in ("cells", "layers"))
+    in_cells, in_layers = (
+        TwoPhaseBalance(simulation, air, CAPACITY, INLET, resolution) for resolution in ("cells", "layers")
+    )
     simulation.add(Balances([in_cells, in_layers]))
     of_bed = float(heat.capacity(particles).sum())
     begin, first, gas = simulation.time, float(particles.temperature.mean()), heat.cells.content
-    left, found = first, []
+    left, lines = first, []
     while simulation.time < 1.0:
         simulation.step()
         left -= flow * simulation.last_step * (heat.cells.leaving - INLET) / of_bed
         by_air = left - (heat.cells.content - gas) / of_bed
         mixed = INLET + (first - INLET) * math.exp(-flow / of_bed * (simulation.time - begin))
         mean = float(particles.temperature.mean())
-        found.append((simulation.time, mean, by_air, float(in_cells.hot.mean()), float(in_layers.hot.mean()), mixed))
+        lines.append((simulation.time, mean, by_air, float(in_cells.hot.mean()), float(in_layers.hot.mean()), mixed))
     names = ("time", "run", "air that leaves", "every cell", "layers", "mixed at once")
-    columns = dict(zip(names, np.array(found).T))
+    columns = dict(zip(names, np.array(lines).T))
     curves["hot bed"] = {name: (values, "s" if name == "time" else "K") for name, values in columns.items()}
     cooled = first - columns["run"][-1]
     rows = [Row("hot bed in cold gas: cooling of the seeds", cooled, unit="K")]

@@ -60,11 +60,11 @@ def schumann(curves: Curves) -> list[Row]:
         },
     )  # fmt: skip
     rows = []
-    for each in heating(case, (0.5, 0.8, 1.1)):
-        rows.append(Row(f"Schumann's bed at {each.time:g} s: largest error of a layer", each.error, 0.0, 0.01))
-        rows.append(Row(f"Schumann's bed at {each.time:g} s: mean error", each.mean_error, 0.0))
-        curves[f"schumann/{each.time:g} s"] = {
-            "height": (each.height, "m"), "solids": (each.solids, "-"), "exact": (each.exact_solids, "-"),
+    for profile in heating(case, (0.5, 0.8, 1.1)):
+        rows.append(Row(f"Schumann's bed at {profile.time:g} s: largest error of a layer", profile.error, 0.0, 0.01))
+        rows.append(Row(f"Schumann's bed at {profile.time:g} s: mean error", profile.mean_error, 0.0))
+        curves[f"schumann/{profile.time:g} s"] = {
+            "height": (profile.height, "m"), "solids": (profile.solids, "-"), "exact": (profile.exact_solids, "-"),
         }  # fmt: skip
     return rows
 

@@ -20,8 +20,8 @@ RHO_C, CONDUCTIVITY = 1200.0, 0.03
 
 def scalar(fluid: FluidSolver, sides: ScalarSides, **changes: Any) -> Scalar:
     """A temperature that starts at 300 K."""
-    given = {"start": 300.0, "capacity": RHO_C, "conductivity": CONDUCTIVITY} | changes
-    return Scalar(fluid, ScalarKind("temperature", "K", "temperature of the fluid", **given), sides)
+    properties = {"start": 300.0, "capacity": RHO_C, "conductivity": CONDUCTIVITY} | changes
+    return Scalar(fluid, ScalarKind("temperature", "K", "temperature of the fluid", **properties), sides)
 
 
 def fluid_of(cells: tuple[int, int, int], conditions: dict[str, Any], size: float = 0.01) -> FluidSolver:
@@ -122,15 +122,15 @@ def closed_box(steps: int) -> tuple[float, float, float]:
     heat.value[:] = 300.0 + 100.0 * random.random(fluid.grid.shape)
     solids, capacity, beta = 280.0 + 200.0 * random.random(fluid.grid.shape), 5e4, 2e5
     least, most = min(heat.value.min(), solids.min()), max(heat.value.max(), solids.max())
-    start, given, outside = heat.content + volume * capacity * float(solids.sum()), heat.content, 0.0
+    start, content, outside = heat.content + volume * capacity * float(solids.sum()), heat.content, 0.0
     for _ in range(steps):
         fluid.step(1e-3, moved(fluid, random))
         share = beta / (1.0 + fluid.last_step * beta / capacity)
-        seen = heat.step(np.full(fluid.grid.shape, share), share * solids)
-        solids += fluid.last_step * share / capacity * (seen - solids)
+        temperature = heat.step(np.full(fluid.grid.shape, share), share * solids)
+        solids += fluid.last_step * share / capacity * (temperature - solids)
         outside = max(outside, least - float(heat.value.min()), float(heat.value.max()) - most)
     end = heat.content + volume * capacity * float(solids.sum())
-    return abs(end - start) / start, outside, heat.content - given
+    return abs(end - start) / start, outside, heat.content - content
 
 
 def conservation(curves: Curves) -> list[Row]:

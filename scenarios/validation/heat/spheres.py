@@ -142,25 +142,25 @@ FLAT = {
 
 def followed(case: Case, times: Iterable[float]) -> tuple[dict[float, list[float]], dict[str, float]]:
     """Temperatures of the spheres of a case by time [s], [K], and the last row of its history."""
-    simulation, found = Simulation(case), {}
+    simulation, by_time = Simulation(case), {}
     for time in sorted(times):
         simulation.until(time)
-        found[time] = simulation.particles.temperature.tolist()
-    return found, row(simulation)
+        by_time[time] = simulation.particles.temperature.tolist()
+    return by_time, row(simulation)
 
 
 def exact_cases(curves: Curves) -> list[Row]:
     """One sphere in a stream, and two spheres, beside exact solutions."""
-    found, now = followed(cooling(), COOLED)
+    by_time, now = followed(cooling(), COOLED)
     lost = [now["heat_imbalance"]]
-    points = [(time, found[time][0], value) for time, value in COOLED.items()]
+    points = [(time, by_time[time][0], value) for time, value in COOLED.items()]
     rows = [worst("sphere that air cools, exact: temperature", points, SHARE * 75.0, unit="K")]
     for name, (keys, cold, hot) in EXACT.items():
         gap, step = SETUP[name]
         case = two_spheres(gap, step, 500.0, keys, **(FLAT if name == "radiation" else {}))
-        found, now = followed(case, {*cold, *hot})
+        by_time, now = followed(case, {*cold, *hot})
         lost.append(now["contact_heat_imbalance"])
-        points = [(time, found[time][0], value) for time, value in cold.items()]
-        points += [(time, found[time][1], value) for time, value in hot.items()]
+        points = [(time, by_time[time][0], value) for time, value in cold.items()]
+        points += [(time, by_time[time][1], value) for time, value in hot.items()]
         rows.append(worst(f"two spheres, {name}, exact: temperature", points, SHARE * (HOT - COLD), unit="K"))
     return [*rows, Row("one and two spheres: largest imbalance of heat (4)", max(lost), 0.0, 1e-12)]

@@ -34,8 +34,8 @@ class Balances(Equipment):
 
     def before(self, simulation: Any, step: float) -> None:
         """Follow the step [s]."""
-        for each in self.balances:
-            each.step(step)
+        for balance in self.balances:
+            balance.step(step)
 
 
 class TwoPhaseBalance:
@@ -104,7 +104,7 @@ class TwoPhaseBalance:
         volume = self.grid.cell_volume
         number = np.arange(nx * ny * nz).reshape(nz, ny, nx)
         eps = fluid.mean_voidage
-        sums = [np.bincount(cell, each, number.size) for each in (b, product)]
+        sums = [np.bincount(cell, weights, number.size) for weights in (b, product)]
         stored = amount * volume * fluid.voidage.reshape(-1) / h
         rows, columns, values = [], [], []
         left = 0.0
@@ -126,7 +126,7 @@ class TwoPhaseBalance:
                 np.add.at(diagonal, numbers[0].ravel(), entering.ravel())
                 np.add.at(right, numbers[0].ravel(), entering.ravel() * enters)
                 top, leaves = numbers[-1].ravel(), (voidage[-1] * inner[-1]).ravel()
-        row, column, value = (np.concatenate(each) for each in (rows, columns, values))
+        row, column, value = (np.concatenate(pieces) for pieces in (rows, columns, values))
         np.add.at(diagonal, row, value)
         if self.place == "layers":  # cells of a layer are one
             row, column, size = row // (nx * ny), column // (nx * ny), nz

@@ -129,11 +129,11 @@ def _fill(p_: np.ndarray, v_: np.ndarray, q_: np.ndarray, p: int, q: int, turnin
     terms = first / (s * (n + s) * (2 * s - 1)) * near + n * (2 * n - 1) / (2 * (n + 1)) * next_near
     terms += n * (4 * n**2 - 1) / (2 * (n + 1) * (2 * s + 1)) * v_[t, q - t - 2, p - m + 1]
     terms -= 2 * (4 * n**2 - 1) / (3 * (n + 1)) * q_[t, q - t - 1, p - m + 1]
-    found = (choose * terms).sum(axis=1)
+    sums = (choose * terms).sum(axis=1)
     rest = (choose * next_near).sum(axis=1)
     turned = choose * (s / (n + 1) * q_[t, q - t - 1, p - m] - 3 / (2 * n * s * (n + 1)) * p_[t, q - t, p - m])
-    p_[m[:, 0], p, q] = found
-    v_[m[:, 0], p, q] = found + 2 * n[:, 0] / ((n[:, 0] + 1) * (2 * n[:, 0] + 3)) * rest
+    p_[m[:, 0], p, q] = sums
+    v_[m[:, 0], p, q] = sums + 2 * n[:, 0] / ((n[:, 0] + 1) * (2 * n[:, 0] + 3)) * rest
     q_[m[:, 0], p, q] = turned.sum(axis=1)
 
 
@@ -241,12 +241,12 @@ def slide(friction: float, linear: bool = False, keep: float = 0.05) -> dict[str
         if slid and not sliding:
             break
         slid = slid or sliding
-    found = {"time": run.time * friction * GRAVITY / speed}
+    numbers = {"time": run.time * friction * GRAVITY / speed}
     for when, steps in (("end of sliding", 0), ("rolling", max(1, int(keep / step)))):
         run.advance(step, steps)
-        found[f"speed, {when}"] = float(run.particles.velocity[0, 0]) / speed
-        found[f"spin, {when}"] = float(run.particles.spin[0, 1]) * radius / speed
-    return found
+        numbers[f"speed, {when}"] = float(run.particles.velocity[0, 0]) / speed
+        numbers[f"spin, {when}"] = float(run.particles.spin[0, 1]) * radius / speed
+    return numbers
 
 
 def strike(angle: float, linear: bool = False) -> dict[str, float]:

@@ -207,11 +207,11 @@ def shear(solid_fraction: float, steps: int, speed: float = 0.02, press: float =
     """
     run, upper = suspension(count, solid_fraction, fixed=True)
     if press > 0.0:
-        made = run.particles
-        made.inverse_mass[upper] = 1.0 / made.mass[upper]
-        made.inverse_inertia[upper] = 2.5 / (made.mass[upper] * made.radius[upper] ** 2)
+        particles = run.particles
+        particles.inverse_mass[upper] = 1.0 / particles.mass[upper]
+        particles.inverse_inertia[upper] = 2.5 / (particles.mass[upper] * particles.radius[upper] ** 2)
         area = float(run.box[0] * run.box[1])
-        made.applied[upper] = np.array([0.5, 0.0, -1.0]) * press * area / int(upper.sum())
+        particles.applied[upper] = np.array([0.5, 0.0, -1.0]) * press * area / int(upper.sum())
     else:
         run.particles.velocity[upper, 0] = speed
     run.refresh()

@@ -58,7 +58,9 @@ def rolling(curves: Curves) -> list[Row]:
     ends = [(mu, run["time"], 2.0 / 7.0) for (mu, _), run in runs.items()]
 
     def kept(when: str) -> list[tuple[float, float, float]]:
-        return [(mu, run[f"{what}, {when}"], 5.0 / 7.0) for (mu, _), run in runs.items() for what in ("speed", "spin")]
+        return [
+            (mu, run[f"{motion}, {when}"], 5.0 / 7.0) for (mu, _), run in runs.items() for motion in ("speed", "spin")
+        ]
 
     return [
         worst("DEM04: end of sliding, mu g t/u0", ends, 6e-3 * 2.0 / 7.0),

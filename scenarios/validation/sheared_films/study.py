@@ -56,12 +56,12 @@ def steps(curves: Curves) -> list[Row]:
 
 def published(curves: Curves) -> list[Row]:
     """Viscosity after a long strain, beside published curves."""
-    found = {each: sheared(each, strain=LONG) for each in SOLID_FRACTIONS}
-    fractions = np.array([run.solid_fraction for run in found.values()])
-    values = np.array([run.viscosity for run in found.values()])
+    runs = {share: sheared(share, strain=LONG) for share in SOLID_FRACTIONS}
+    fractions = np.array([run.solid_fraction for run in runs.values()])
+    values = np.array([run.viscosity for run in runs.values()])
     curves["viscosity"] = {"solid_fraction": (fractions, "-"), "films": (values, "-")}
     rows = []
-    for name, run in found.items():
+    for name, run in runs.items():
         at, value = run.solid_fraction, 1.0 + run.viscosity
         rows += [
             Row(f"at {name:g}: fluid and films, against Krieger & Dougherty", value, krieger_dougherty(at)),
@@ -102,11 +102,11 @@ def _draw(folder: Path, curves: Curves) -> None:
     """Viscosity against solid fraction."""
     figure, axes = panels()
     at = np.linspace(0.25, 0.57, 100)
-    axes.plot(at, [krieger_dougherty(each) for each in at], color=GREY, label="Krieger & Dougherty (1959)")
-    axes.plot(at, [morris_boulay(each) for each in at], color=ORANGE, label="Morris & Boulay (1999)")
-    found = curves["viscosity"]
-    films = np.asarray(found["films"][0])
-    axes.plot(found["solid_fraction"][0], 1.0 + films, "o", color=BLUE, label="fluid and films")
+    axes.plot(at, [krieger_dougherty(share) for share in at], color=GREY, label="Krieger & Dougherty (1959)")
+    axes.plot(at, [morris_boulay(share) for share in at], color=ORANGE, label="Morris & Boulay (1999)")
+    viscosity = curves["viscosity"]
+    films = np.asarray(viscosity["films"][0])
+    axes.plot(viscosity["solid_fraction"][0], 1.0 + films, "o", color=BLUE, label="fluid and films")
     axes.set_yscale("log")
     label(axes, "solid fraction", "-", "relative viscosity", "-")
     legend(axes)
@@ -166,8 +166,8 @@ def sheared(
     cutoff_ratio  reach of films over the reduced radius [-]
     solid         material of the spheres; its friction dissipates, too
     """
-    made, upper = suspension(count, solid_fraction, fixed=True, viscosity=VISCOSITY)
-    spheres, (width, depth, _) = made.particles, made.box
+    suspended, upper = suspension(count, solid_fraction, fixed=True, viscosity=VISCOSITY)
+    spheres, (width, depth, _) = suspended.particles, suspended.box
     if press > 0.0:
         spheres.inverse_mass[upper] = 1.0 / spheres.mass[upper]
         spheres.inverse_inertia[upper] = 2.5 / (spheres.mass[upper] * spheres.radius[upper] ** 2)
