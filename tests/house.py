@@ -32,6 +32,9 @@ FEATURES = re.compile(
 PARAMETERS = ("p", "parameters", "numbers", "then", "now", "last", "modes")
 """Names that arrays of parameters of laws, and of what a pair or particle remembers, have in the rooms of loops."""
 
+VAGUE = {"each", "found", "given", "made", "known", "held", "seen", "said", "what"}
+"""Names that do not say what they hold: a particle, a face, a species, a key, a law."""
+
 ROOMS_OF_LOOPS = re.compile(r"cfddem/(backend|particles|fluid|coupling|features|model)/")
 
 MOST_ARGUMENTS = 8
@@ -48,6 +51,7 @@ class Count:
     asking          files with such questions
     positions       reads or writes of a fixed place of an array of :data:`PARAMETERS`, such as `p[-1]`
     many_arguments  functions and methods of more than eight arguments of all kinds, without `self` and `cls`
+    vague           places where a name of :data:`VAGUE` is given a value, arguments and fields among them
     """
 
     files: int = 0
@@ -57,6 +61,7 @@ class Count:
     asking: int = 0
     positions: int = 0
     many_arguments: int = 0
+    vague: int = 0
 
     def __add__(self, other: Count) -> Count:
         return Count(*(a + b for a, b in zip(astuple(self), astuple(other))))
@@ -152,6 +157,15 @@ def many_arguments(path: Path) -> Iterator[str]:
                 yield f"{node.lineno} {node.name}: {number}"
 
 
+def vague(path: Path) -> Iterator[str]:
+    """Places of a file where a name of :data:`VAGUE` is given a value, as `line: name`."""
+    for node in ast.walk(tree(path)):
+        is_set = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        name = node.arg if isinstance(node, ast.arg) else last_name(node) if is_set else ""
+        if name in VAGUE:
+            yield f"{node.lineno}: {name}"
+
+
 def count(path: Path) -> Count:
     """Numbers of a file."""
     asked = len(list(questions(path)))
@@ -163,6 +177,7 @@ def count(path: Path) -> Count:
         asking=bool(asked),
         positions=len(list(positions(path))),
         many_arguments=len(list(many_arguments(path))),
+        vague=len(list(vague(path))),
     )
 
 
@@ -250,7 +265,7 @@ def every_circle() -> list[list[str]]:
 
 def main(words: list[str]) -> int:
     """Print the numbers; with a name of a list, such as `questions`, also each place."""
-    lists = {"questions": questions, "positions": positions, "many_arguments": many_arguments}
+    lists = {"questions": questions, "positions": positions, "many_arguments": many_arguments, "vague": vague}
     if set(words) - set(lists):
         print(f"usage: python -m tests.house [{'] ['.join(lists)}]", file=sys.stderr)
         return 2

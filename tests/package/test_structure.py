@@ -255,16 +255,16 @@ def test_no_function_is_too_long() -> None:
 
 
 LIMITS = {
-    "closures": Count(questions=0, positions=0, many_arguments=0),
-    "cfddem": Count(questions=43, positions=0, many_arguments=2),
-    "scenarios": Count(questions=10, positions=0, many_arguments=0),
-    "scenarios.references": Count(questions=0, positions=0, many_arguments=0),
+    "closures": Count(questions=0, positions=0, many_arguments=0, vague=0),
+    "cfddem": Count(questions=43, positions=0, many_arguments=2, vague=34),
+    "scenarios": Count(questions=10, positions=0, many_arguments=0, vague=21),
+    "scenarios.references": Count(questions=0, positions=0, many_arguments=0, vague=0),
 }
 """Limits of the numbers of `python -m tests.house`. They may only fall."""
 
 
 @pytest.mark.parametrize("package", LIMITS)
-@pytest.mark.parametrize("number", ["questions", "positions", "many_arguments"])
+@pytest.mark.parametrize("number", ["questions", "positions", "many_arguments", "vague"])
 def test_the_house_stays_as_simple_as_it_is(package: str, number: str) -> None:
     """`python -m tests.house questions` lists the places; the others likewise."""
     assert getattr(counts()[package], number) <= getattr(LIMITS[package], number)
