@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cfddem, parsed
+from command_line import call, parsed
 from matplotlib.colors import to_hex
 
 from cfddem.backend.errors import InputError
@@ -157,15 +157,17 @@ def test_energy_falls() -> None:
     assert energy[-1] < 0.8 * energy[0]
 
 
-def test_the_outcomes_have_their_names() -> None:
+@pytest.mark.parametrize("solver", ["equations", pytest.param("particles", marks=pytest.mark.slow)])
+def test_the_outcomes_have_their_names(solver: str) -> None:
     """FA, PA1, PA2, PA3 and FS, each where the source finds it."""
-    assert simulate_three_spheres(2.0, 45.0).outcome == "PA1"
-    assert simulate_three_spheres(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
-    assert simulate_three_spheres(8.0, 0.0).outcome == "PA3"
-    assert simulate_three_spheres(4.0, 0.0).outcome == "FA"
-    assert simulate_three_spheres(10.0, 45.0).outcome == "FS"
-    assert simulate_three_spheres(10.0, 0.0, spheres=2).outcome == "FS"
-    assert simulate_three_spheres(3.0, 0.0, spheres=2).outcome == "FA"
+    collide = partial(simulate_three_spheres, solver=solver)
+    assert collide(2.0, 45.0).outcome == "PA1"
+    assert collide(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
+    assert collide(8.0, 0.0).outcome == "PA3"
+    assert collide(4.0, 0.0).outcome == "FA"
+    assert collide(10.0, 45.0).outcome == "FS"
+    assert collide(10.0, 0.0, spheres=2).outcome == "FS"
+    assert collide(3.0, 0.0, spheres=2).outcome == "FA"
 
 
 def test_a_map_equals_single_runs_within_its_tolerance() -> None:
@@ -204,11 +206,10 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: float) -> None:
 
 
 def test_the_command_prints_json() -> None:
-    done = cfddem("three-spheres", "--stokes", "20", "--theta12", "30", "--json")
-    result = parsed(done.stdout)
+    result = parsed(call("three-spheres", "--stokes", "20", "--theta12", "30", "--json").out)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
-    words = cfddem("three-spheres", "--stokes", "20", "--theta12", "30").stdout
+    words = call("three-spheres", "--stokes", "20", "--theta12", "30", "--solver", "equations").out
     assert "FS: all separate" in words and "t*: time over (diameter / impact speed)" in words
 
 
