@@ -32,3 +32,12 @@ def one_thread() -> Iterator[None]:
     use_threads(1)
     yield
     use_threads(before)
+
+
+@pytest.fixture(autouse=True)
+def one_thread_again(one_thread: None) -> Iterator[None]:
+    """A test that leaves more threads behind would let all later ones compile and run loops for several."""
+    from cfddem.backend.compile import use_threads
+
+    yield
+    use_threads(1)
