@@ -8,8 +8,9 @@ import pytest
 import rooms  # noqa: F401  tests import each other
 
 LONGEST = (
-    "test_gallery", "test_wall_bridges", "test_many_bridges", "test_bridges", "test_docs", "test_golden", "test_ghosts",
-    "test_resolved_suspension", "test_run", "test_wet_beds",
+    "test_gallery", "test_many_bridges", "test_wall_bridges", "test_bridges", "test_docs", "test_coupling_ranks",
+    "test_cluster_failures", "test_empty_ranks", "study", "test_wet_wall", "test_golden", "test_ghosts", "test_run",
+    "test_wet_beds",
 )  # fmt: skip
 """Files that take longest, most of it to compile loops. They come first, so that two workers end together.
 
@@ -32,3 +33,12 @@ def one_thread() -> Iterator[None]:
     use_threads(1)
     yield
     use_threads(before)
+
+
+@pytest.fixture(autouse=True)
+def one_thread_again(one_thread: None) -> Iterator[None]:
+    """A test that leaves more threads behind would let all later ones compile and run loops for several."""
+    from cfddem.backend.compile import use_threads
+
+    yield
+    use_threads(1)

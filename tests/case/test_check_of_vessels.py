@@ -212,10 +212,14 @@ def _of_cells(case: Case) -> list[str]:
     return [each.remedy for each in preflight(case).issues if each.key == "column.cell" and "memory" not in each.reason]
 
 
+CELLS = (1e-4, 1e-3, 1.3e-3, 2e-3, 2.5e-3, 3e-3, 3.7e-3, 4e-3, 6.1e-3, 7.5e-3, 0.011, 0.02, 0.05)
+
+
+@pytest.mark.parametrize("cells", [CELLS[::4], pytest.param(CELLS, marks=pytest.mark.slow)], ids=["few", "all"])
 @pytest.mark.parametrize("name", [name for name, each in gallery().items() if each.fluid is not None])
-def test_the_check_of_a_suggested_cell_suggests_nothing(name: str) -> None:
+def test_the_check_of_a_suggested_cell_suggests_nothing(name: str, cells: tuple[float, ...]) -> None:
     case = gallery()[name]
-    for cell in (1e-4, 1e-3, 1.3e-3, 2e-3, 2.5e-3, 3e-3, 3.7e-3, 4e-3, 6.1e-3, 7.5e-3, 0.011, 0.02, 0.05):
+    for cell in cells:
         for remedy in _of_cells(case.with_(**{"column.cell": cell})):
             (edges,) = re.findall(r"(\[[^\]]*\]|[\d.e-]+) m fits", remedy)
             suggested = [float(each) for each in edges.strip("[]").split(", ")]

@@ -118,7 +118,7 @@ def quick(line: str) -> bool:
     """Whether a command takes seconds: no comparison with the literature, no run of a whole demonstration, and no loops
     that few others use."""
     verb = line.split()[1]
-    return verb not in ("validate", "bench", "wet-pair", "wet-wall", "three-spheres") and (
+    return verb not in ("validate", "bench", "wet-pair", "wet-wall", "three-spheres", "film-impact") and (
         verb not in ("run", "sweep") or "until=" in line
     )
 

@@ -24,14 +24,15 @@ from cfddem.io.reading import open_run
 LIMITS = workers.Limits(seconds=0.2)
 
 
-def test_two_thousand_mutated_inputs_are_accepted_or_refused_in_clear_lines(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [400, pytest.param(2000, marks=pytest.mark.slow)])
+def test_mutated_inputs_are_accepted_or_refused_in_clear_lines(count: int, tmp_path: Path) -> None:
     """Exit code 0 of the command says that there was no traceback, no hang and no unclear answer."""
-    command = [sys.executable, "-m", "tests.fuzz", "--count", "2000", "--workers", "1", "--nice", "0", "--output"]
+    command = [sys.executable, "-m", "tests.fuzz", "--count", str(count), "--workers", "1", "--nice", "0", "--output"]
     done = subprocess.run([*command, str(tmp_path / "out")], cwd=HOME, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     answers = json.loads((tmp_path / "out").read_text())["answers"]
-    assert answers["accepted"] + answers["refused"] == 2000
-    assert min(answers.values()) > 200, "both kinds of answers are tried"
+    assert answers["accepted"] + answers["refused"] == count
+    assert min(answers.values()) > count // 10, "both kinds of answers are tried"
 
 
 @pytest.mark.slow

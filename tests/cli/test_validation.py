@@ -126,9 +126,12 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "part",
-    [study.gap_histories, study.roughness, study.gondret, checks.walls, checks.film_zone, checks.tables],
+    [
+        study.gap_histories, study.gondret, checks.film_zone, checks.tables,
+        *(pytest.param(part, marks=pytest.mark.slow) for part in (study.roughness, checks.walls)),
+    ],
     ids=lambda part: part.__name__,
-)
+)  # fmt: skip
 def test_quick_parts_of_the_binary_collisions_hold(part: Callable[[study.Curves], list[Row]]) -> None:
     assert [row.as_dict() for row in part({}) if row.verdict == "FAILS"] == []
 

@@ -140,7 +140,9 @@ def test_no_canary_is_executed_by_processes_of_this_python(tmp_path: Path) -> No
     assert not trap.executed()
 
 
-@pytest.mark.parametrize("words", ["report .", "view .", "view . --history"])
+@pytest.mark.parametrize(
+    "words", ["report .", *(pytest.param(each, marks=pytest.mark.slow) for each in ("view .", "view . --history"))]
+)
 def test_no_canary_in_a_run_folder_is_executed_by_commands_started_there(words: str, tmp_path: Path) -> None:
     """As the files `pyvista.py` and `matplotlibrc` of a run that somebody else has sent."""
     trap = lay(made_up(tmp_path / "run", rows=101))

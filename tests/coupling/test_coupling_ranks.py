@@ -56,8 +56,8 @@ ALL_FORCES: dict[str, Any] = {
 
 BEDS = {
     "all forces": case_of(
-        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", run__energy_budget=True,
-        **ALL_FORCES
+        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__history="mei_adrian", run__energy_budget=True,
+        laws__agitation="pseudo_turbulence", **ALL_FORCES
     ),
     "crossing a periodic border": case_of(
         BEADS, column__cell=0.004, column__sides="periodic", column__ends="periodic", bed__inlet_velocity=0.0,
@@ -126,7 +126,7 @@ def assert_same_bits(found: dict[str, Array], alone: dict[str, Array]) -> None:
     assert found["energy"] == pytest.approx(alone["energy"], rel=1e-12)
 
 
-@pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 1), (1, 2, 2)])
+@pytest.mark.parametrize("shape", [(1, 2, 1), pytest.param((2, 2, 1), marks=pytest.mark.slow), (1, 2, 2)])
 @pytest.mark.parametrize("name", BEDS)
 def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
     """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders.
@@ -343,7 +343,7 @@ def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPat
     assert abs(imbalance[2]) > 1e-3
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(
     ranks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -379,7 +379,8 @@ def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(
 
 
 @needs_mpi
-@pytest.mark.parametrize("shape", [(1, 2, 1), pytest.param((2, 2, 2), marks=pytest.mark.slow)])
+@pytest.mark.slow  # as a plain test: test_cluster_commands.py, a bed on two ranks
+@pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 2)])
 def test_ranks_under_mpi_are_one_process(shape: tuple[int, int, int]) -> None:
     """A small liquid bed."""
     given = BEADS, {"column__cell": 0.004, "bed__initial_velocity": [0.3, 0.2, 0.1]}, 0.01

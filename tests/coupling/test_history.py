@@ -259,6 +259,17 @@ def test_the_energy_of_the_history_force_is_a_line_of_the_budget() -> None:
     assert shares[1] < max(1.5 * shares[0], 1e-3)
 
 
+def test_same_bits_after_a_restart() -> None:
+    simulation = stirred(suspension(**{"laws.history": "mei_adrian"}))
+    for _ in range(4):
+        simulation.step()
+    again = Simulation.restored(simulation.case, simulation.checkpoint())
+    for each in (simulation, again):
+        each.step()
+    assert np.array_equal(simulation.particles.velocity, again.particles.velocity)
+
+
+@pytest.mark.slow  # as a plain test: a bed with all forces that is divided among ranks, which run on all threads
 def test_same_bits_on_one_and_two_threads_and_after_a_restart() -> None:
     states, kept = [], []
     before = use_threads(None)

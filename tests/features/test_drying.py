@@ -72,25 +72,37 @@ def dried(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
     return {**particles, **cells, "history": np.array(list(row(simulation).values()))}
 
 
-def test_a_drying_bed_has_the_same_bits_on_two_threads_and_when_it_goes_on() -> None:
-    before = use_threads(1)
-    expected, stopped = dried(Simulation(MOVING), 20), Simulation(MOVING)
+@pytest.fixture(scope="module")
+def alone() -> dict[str, np.ndarray]:
+    """A bed after 20 steps of one process on one thread."""
+    found = dried(Simulation(MOVING), 20)
+    assert np.ptp(found["vapour"]) > 1e-3 and found["radius of particles"].max() < 0.6e-3
+    return found
+
+
+def assert_same_bits(found: dict[str, np.ndarray], alone: dict[str, np.ndarray]) -> None:
+    for name, values in alone.items():
+        assert np.array_equal(values, found[name], equal_nan=True), name
+
+
+def test_a_drying_bed_has_the_same_bits_when_it_goes_on(alone: dict[str, np.ndarray]) -> None:
+    stopped = Simulation(MOVING)
     dried(stopped, 10)
-    resumed = dried(Simulation.restored(MOVING, stopped.checkpoint()), 10)
-    use_threads(2)
-    threaded = dried(Simulation(MOVING), 20)
-    use_threads(before)
-    assert np.ptp(expected["vapour"]) > 1e-3 and expected["radius of particles"].max() < 0.6e-3
-    for found in (resumed, threaded):
-        for name, values in expected.items():
-            assert np.array_equal(values, found[name], equal_nan=True), name
+    assert_same_bits(dried(Simulation.restored(MOVING, stopped.checkpoint()), 10), alone)
 
 
-def test_two_processes_dry_a_bed_with_the_bits_of_one() -> None:
-    alone = dried(Simulation(MOVING), 20)
+@pytest.mark.slow  # as plain tests: the scalar of a fluid, and a bed with all forces, on two threads
+def test_a_drying_bed_has_the_same_bits_on_two_threads(alone: dict[str, np.ndarray]) -> None:
+    before = use_threads(2)
+    try:
+        assert_same_bits(dried(Simulation(MOVING), 20), alone)
+    finally:
+        use_threads(before)
+
+
+def test_two_processes_dry_a_bed_with_the_bits_of_one(alone: dict[str, np.ndarray]) -> None:
     for shared in on_ranks(2, lambda ranks: dried(Simulation(MOVING, communicator=ranks), 20)):
-        for name, values in alone.items():
-            assert np.array_equal(values, shared[name], equal_nan=True), name
+        assert_same_bits(shared, alone)
 
 
 @pytest.mark.slow  # its law set is compiled for no other plain test

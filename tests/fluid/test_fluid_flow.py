@@ -42,8 +42,7 @@ def test_order_in_time_is_two_for_velocity_and_pressure():
     assert min(order([rms(a - b) for a, b in pairwise(results)])) > 1.9
 
 
-@pytest.mark.parametrize("model", ["A", "B"])
-@pytest.mark.parametrize("voidage", [1.0, 0.37])
+@pytest.mark.parametrize(("voidage", "model"), [(1.0, "A"), (0.37, "A"), (0.37, "B")])
 def test_poiseuille_flow_between_plates(voidage, model):
     """u = G/(2 mu) z (H - z): the parabola is met to second order, exactly so but for the wall half-cell term."""
     errors = []
@@ -75,7 +74,7 @@ def test_shear_flow_of_a_layered_fluid():
         grid = Grid((1, 1, n), (1.0 / n,) * 3)
         thickness = np.broadcast_to(1.0 + 4.0 * grid.centres()[2], grid.shape)
         fluid = FluidSolver(grid, sides, density=1.0, viscosity=thickness)
-        fluid.run_until(1.5)
+        fluid.run_until(0.5)
         z = grid.faces(0)[2]
         errors.append(np.abs(fluid.face_velocity(0) - np.log(1.0 + 4.0 * z) / np.log(5.0)).max())
     assert errors[1] < 0.02

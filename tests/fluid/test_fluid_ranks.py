@@ -199,10 +199,10 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     }
 
 
-CUBE = pytest.param((3, 3, 3), marks=pytest.mark.slow)
+PLAIN, MORE = [(1, 2, 1), (3, 1, 2), (2, 2, 2)], [(3, 1, 1), (1, 1, 3), (2, 2, 1), (3, 3, 3)]
 
 
-@pytest.mark.parametrize("shape", [(3, 1, 1), (1, 2, 1), (1, 1, 3), (2, 2, 1), (3, 1, 2), (2, 2, 2), CUBE])
+@pytest.mark.parametrize("shape", [*PLAIN, *(pytest.param(each, marks=pytest.mark.slow) for each in MORE)])
 @pytest.mark.parametrize("name", FLOWS)
 def test_a_divided_fluid_is_the_whole_one(name: str, shape: tuple[int, ...]) -> None:
     """Fields, forces, budgets, loads on walls and values at points after two steps, bit for bit.

@@ -25,7 +25,7 @@ def test_a_sliding_lid_drags_the_floor_by_mu_u_over_h() -> None:
     fluid = FluidSolver(
         Grid((4, 1, 8), (0.01,) * 3), sides | {"z_high": NoSlip((0.2, 0.0, 0.0))}, density=1.0, viscosity=0.1
     )
-    fluid.run_until(0.5, largest=1e-3)
+    fluid.run_until(0.1, largest=1e-3)  # 15 times the slowest decay, h^2/(pi^2 nu)
     loads, exact = loads_on_walls(fluid, np.zeros(3)), 0.1 * 0.2 / 0.08 * 4e-4
     assert loads["z_low"][0][0] == pytest.approx(exact, rel=1e-6)
     assert loads["z_high"][0][0] == pytest.approx(-exact, rel=1e-6)
@@ -38,7 +38,7 @@ def test_walls_of_a_channel_carry_what_the_pressure_drives() -> None:
     fluid = FluidSolver(
         Grid((2, 12, 10), (0.01,) * 3), {"x_low": Periodic(3.0), "x_high": Periodic(3.0)}, density=1.0, viscosity=0.5
     )
-    fluid.run_until(0.5, largest=1e-3)
+    fluid.run_until(0.02, largest=1e-3)  # 17 times the slowest decay
     loads = loads_on_walls(fluid, np.zeros(3))
     carried = sum(loads[name][0][0] for name in ("y_low", "y_high", "z_low", "z_high"))
     assert carried == pytest.approx(3.0 * 0.02 * 0.12 * 0.1, rel=1e-5)

@@ -96,8 +96,11 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-LONG = {"averages", "cluster", "contact-law", "layers", "measure", "report", "user-law", "walls", "wet-particles"}
-"""Pages with many loops to compile."""
+LONG = {
+    "averages", "cluster", "contact-law", "layers", "measure", "programs", "read-results", "report", "sweep",
+    "user-law", "walls", "wet-particles",
+}  # fmt: skip
+"""Pages with many loops to compile, or processes to start."""
 
 
 def is_long(page: Path) -> bool:

@@ -150,10 +150,11 @@ def test_the_page_of_an_executed_notebook_shows_its_outputs(tmp_path: Path, monk
     assert made.page("own_law") == plain
 
 
-def test_all_notebooks_run_in_three_minutes() -> None:
+@pytest.mark.parametrize("names", [("collision",), pytest.param(tool().NAMES, marks=pytest.mark.slow)], ids=len)
+def test_notebooks_run_in_three_minutes(names: tuple[str, ...]) -> None:
     """They are kept for the documentation, which shows their outputs."""
     pytest.importorskip("nbclient", reason="needs `pip install 'cfddem[notebook]'`")
     pytest.importorskip("ipykernel", reason="needs `pip install 'cfddem[notebook]'`")
     made = tool()
-    times = {name: made.execute(name, made.EXECUTED) for name in made.NAMES}
+    times = {name: made.execute(name, made.EXECUTED) for name in names}
     assert sum(times.values()) < SECONDS, times

@@ -45,6 +45,7 @@ def test_the_source_package_holds_what_its_first_page_links_to() -> None:
     assert f"version: {cfddem.__version__}\n" in (HOME / "CITATION.cff").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow  # mypy reads the whole package
 def test_mypy_accepts_scripts_of_users_and_finds_a_wrong_argument_in_one(tmp_path: Path) -> None:
     """Also the scripts of the first page."""
     pytest.importorskip("mypy")

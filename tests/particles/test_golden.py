@@ -16,7 +16,8 @@ LONG = {
     "periodic_fluid", "energies_dry_rolling", "own_minimum_gap_and_film", "mesh_film", "rolling_constant_torque",
     "collision_film_verlet", "collision_film_overlap_onset", "linear_contact_film", "linear_contact", "mesh_from_file",
     "rolling_spring_dashpot", "collision_wall_film_verlet", "collision_head_on_film", "cohesion", "rolling_on_a_floor",
-    "settling_sphere", "collision_thick_film", "mesh_that_moves", "packed_bed",
+    "settling_sphere", "collision_thick_film", "mesh_that_moves", "packed_bed", "periodic_box_film_verlet",
+    "collision_rescaled_spring",
 }  # fmt: skip
 """Runs with laws of their own, which take long to compile."""
 

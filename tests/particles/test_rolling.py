@@ -110,8 +110,8 @@ def test_sphere_rolls_down_a_slope_from_the_angle_of_rolling_friction() -> None:
 @pytest.mark.parametrize(
     ("choice", "film"),
     [
-        ("constant_torque", False), ("spring_dashpot", False), ("spring_dashpot", True),
-        pytest.param("constant_torque", True, marks=pytest.mark.slow),
+        ("constant_torque", False), ("spring_dashpot", False),
+        *(pytest.param(choice, True, marks=pytest.mark.slow) for choice in CHOICES.values()),
     ],
 )  # fmt: skip
 def test_a_pair_keeps_its_momentum(choice: str, film: bool) -> None:

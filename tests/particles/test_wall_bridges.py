@@ -20,7 +20,7 @@ from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
 from closures import bridge, capillary, lubrication
 from closures.liquid_film import film_volume
 
-LAWS = replace(THIN, contact_angle=ANGLE, cut="zero")
+LAWS = replace(THIN, contact_angle=ANGLE)
 WET_WALLS = replace(LAWS, wall_share=0.5, wall_film=1e-5, wall_patch=2.0 * RADIUS)
 GAP = 0.5 * FILM
 
@@ -162,7 +162,7 @@ def test_liquid_of_a_wall_moves_with_its_surface(kind: str) -> None:
         wall = Cylinder(point=(0, 0, -4e-3), radius=4e-3, length=8e-3, spin=(0.0, 0.0, 250.0))
         inward = -np.array([np.cos(0.2), np.sin(0.2), 0.0])
         place = (RADIUS + GAP - 4e-3) * inward + [0.0, 0.0, 1e-4]
-    run, bridges = above(wall, place, replace(WET_WALLS, viscosity=0.0, film="none", tangential="none"))
+    run, bridges = above(wall, place, replace(WET_WALLS, viscosity=0.0, film="none", tangential="none", cut="zero"))
     assert bridges.count == 1 and int(run.walls.patch_count[0]) == 1
     for steps, patches in ((500, 1), (1500, 2)):
         run.particles.position[0], run.particles.velocity[0] = place + RADIUS * inward, 0.0

@@ -87,7 +87,9 @@ def test_a_plane_from_a_file_is_a_plane(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fold", [-0.3, -0.02, -0.002, 0.002, 0.02, 0.3])
-@pytest.mark.parametrize("way", [(1.0, 0.0), (0.8, 0.6)], ids=["straight", "slant"])
+@pytest.mark.parametrize(
+    "way", [pytest.param((1.0, 0.0), marks=pytest.mark.slow, id="straight"), pytest.param((0.8, 0.6), id="slant")]
+)
 def test_force_does_not_jump_at_a_fold(fold: float, way: tuple[float, float]) -> None:
     """Over ridges and grooves of any angle: the force changes with the distance, however short the steps."""
     wall, depth = sheet(6, fold), overlap(MASS * GRAVITY)

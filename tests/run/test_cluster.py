@@ -28,7 +28,10 @@ def shared(ranks: int, *case: Any) -> tuple[dict[str, np.ndarray], int, int]:
     return joined([each["state"] for each in parts]), sum(each["arrived"] for each in parts), parts[0]["lists"]
 
 
-@pytest.mark.parametrize("kind", cluster_runs.KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] * (kind in ("dry", "polydisperse"))) for kind in cluster_runs.KINDS],
+)
 def test_two_ranks_have_the_bits_of_one(kind: str) -> None:
     """Every field of particles and pairs, one of a user among them; particles change ranks several times."""
     found, moved, lists = shared(2, kind, 600, 200)
@@ -46,6 +49,7 @@ def test_many_ranks_have_the_bits_of_one(kind: str, ranks: int) -> None:
     assert_same_bits(found, alone(kind, 10_000, 500))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("without", ["film", "memory"])
 def test_an_exchange_that_is_left_out_is_noticed(without: str) -> None:
     """Velocities between kick and film impulses; memories of pairs that change rank."""

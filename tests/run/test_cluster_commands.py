@@ -97,6 +97,7 @@ def assert_same_files(one: Path, other: Path) -> None:
             assert first[column][()] == pytest.approx(second[column][()], rel=1e-12, nan_ok=True), column
 
 
+@pytest.mark.slow  # as plain tests: a bed on two ranks, and ranks in one process that go on with another number
 def test_files_of_ranks_are_those_of_one_process_and_any_number_goes_on(case: Path) -> None:
     """Snapshots, recorded collisions, history, report; then two ranks, and one, go on from a checkpoint of three."""
     home = case.parent

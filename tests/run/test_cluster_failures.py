@@ -126,7 +126,7 @@ def assert_goes_on(run: Path, one: Path, ranks: int) -> None:
 @pytest.mark.parametrize(
     ("how", "code", "message"),
     [
-        ("raise", 1, "cfddem: rank 1: ValueError: something unforeseen"),
+        pytest.param("raise", 1, "cfddem: rank 1: ValueError: something unforeseen", marks=pytest.mark.slow),
         ("message", 1, "cfddem: rank 1: ValueError: something unforeseen"),
         ("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run"),
         pytest.param("exit0", 3, "rank 1: sys.exit(0) was called within the run", marks=pytest.mark.slow),
@@ -172,7 +172,7 @@ def begun(home: Path, run: Path, processes: Path) -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("rank", [0, 1])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_a_killed_rank_is_named_with_what_to_do(home: Path, tmp_path: Path, rank: int) -> None:
     """In one line, with exit code 137, as the page of clusters says; the launcher's text remains."""
     run = tmp_path / "run"
@@ -234,6 +234,7 @@ def other_ranks(run: Path) -> list[str]:
     return [line for line in found.splitlines() if str(run) in line and not line.startswith("Z")]
 
 
+@pytest.mark.slow  # as a plain test: one rank that is killed
 def test_killed_ranks_leave_a_whole_folder_that_goes_on(home: Path, tmp_path: Path) -> None:
     """Twice, going on with another number of ranks; the end is that of one process."""
     kill_all(home, tmp_path / "run", kills=2, seed=1)

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cfddem.backend.communicator import SERIAL
 from cfddem.features import liquid
 from cfddem.features.spray import SprayZone
 from cfddem.plotting.curves import draw_coating, panels
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run.history import all_columns
-from cfddem.run.simulation import Simulation
 from scenarios.beds.coating import bed, coating, distribution
 
 RUN = SimpleNamespace(
@@ -40,10 +40,12 @@ def test_the_case_begins_dry_and_sprays_into_the_column() -> None:
 def test_the_share_in_the_spray_zone_is_measured_from_the_start() -> None:
     """Drops that begin later do not change where the particles are."""
     case = bed().with_(**{"spray.nozzle": [0.025, 0.005, 0.060]})
-    simulation = Simulation(case)
-    inside = simulation.feature(SprayZone).spray.zone(simulation.owned.position)
+    places = np.random.default_rng(1).uniform(0.0, [0.050, 0.010, 0.060], (case.bed.count, 3))
+    simulation = SimpleNamespace(communicator=SERIAL, owned=SimpleNamespace(position=places, count=len(places)))
+    zone = SprayZone(case, simulation)
+    inside = zone.spray.zone(places)
     assert 0 < inside.sum() < case.bed.count
-    assert simulation.feature(SprayZone).share(simulation) == inside.mean()
+    assert zone.share(simulation) == inside.mean()
 
 
 def test_the_distribution_of_the_coating_is_measured_and_drawn() -> None:

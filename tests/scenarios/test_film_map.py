@@ -22,7 +22,10 @@ sys.path.insert(0, str(HOME / "docs" / "tools"))
 import film_map as page
 
 
-@pytest.mark.parametrize("point", points(), ids=lambda point: point.name)
+@pytest.mark.parametrize(
+    "point",
+    [pytest.param(point, id=point.name, marks=[pytest.mark.slow] * (n % 4 > 0)) for n, point in enumerate(points())],
+)
 def test_beds_have_the_numbers_of_the_design(point: Point) -> None:
     """Stokes number of terminal velocity, solid fraction by Richardson and Zaki, density ratio; a warning of waves."""
     for film in (DRY, *ROUGHNESS):

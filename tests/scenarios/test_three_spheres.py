@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cfddem, parsed
+from command_line import call, parsed
 from matplotlib.colors import to_hex
 
 from cfddem.backend.errors import InputError
@@ -28,12 +28,18 @@ def failed(rows: list[Row]) -> list[object]:
 
 @pytest.mark.parametrize(
     "part",
-    [pytest.param(study.printed, marks=pytest.mark.slow), study.thresholds, study.two_spheres],
+    [*(pytest.param(part, marks=pytest.mark.slow) for part in (study.printed, study.thresholds)), study.two_spheres],
     ids=lambda part: part.__name__,
 )
 def test_published_numbers_hold(part, tmp_path) -> None:
     """Within 0.5 % of Davis (2023), and 1e-4 of the analytic law of Davis & Sitison (2020)."""
     assert failed(part(tmp_path, {})) == []
+
+
+@pytest.mark.parametrize(("angle", "threshold"), [(30.0, 14.1), (45.0, 7.0)])
+def test_the_first_pair_separates_before_the_second_contact_below_a_threshold(angle: float, threshold: float) -> None:
+    """Davis (2023): the Stokes number at which e12 jumps, within 0.6 %."""
+    assert study.parts_before(0.994 * threshold, angle) != study.parts_before(1.006 * threshold, angle)
 
 
 @pytest.mark.slow
@@ -157,15 +163,17 @@ def test_energy_falls() -> None:
     assert energy[-1] < 0.8 * energy[0]
 
 
-def test_the_outcomes_have_their_names() -> None:
+@pytest.mark.parametrize("solver", ["equations", pytest.param("particles", marks=pytest.mark.slow)])
+def test_the_outcomes_have_their_names(solver: str) -> None:
     """FA, PA1, PA2, PA3 and FS, each where the source finds it."""
-    assert simulate_three_spheres(2.0, 45.0).outcome == "PA1"
-    assert simulate_three_spheres(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
-    assert simulate_three_spheres(8.0, 0.0).outcome == "PA3"
-    assert simulate_three_spheres(4.0, 0.0).outcome == "FA"
-    assert simulate_three_spheres(10.0, 45.0).outcome == "FS"
-    assert simulate_three_spheres(10.0, 0.0, spheres=2).outcome == "FS"
-    assert simulate_three_spheres(3.0, 0.0, spheres=2).outcome == "FA"
+    collide = partial(simulate_three_spheres, solver=solver)
+    assert collide(2.0, 45.0).outcome == "PA1"
+    assert collide(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
+    assert collide(8.0, 0.0).outcome == "PA3"
+    assert collide(4.0, 0.0).outcome == "FA"
+    assert collide(10.0, 45.0).outcome == "FS"
+    assert collide(10.0, 0.0, spheres=2).outcome == "FS"
+    assert collide(3.0, 0.0, spheres=2).outcome == "FA"
 
 
 def test_a_map_equals_single_runs_within_its_tolerance() -> None:
@@ -204,11 +212,10 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: float) -> None:
 
 
 def test_the_command_prints_json() -> None:
-    done = cfddem("three-spheres", "--stokes", "20", "--theta12", "30", "--json")
-    result = parsed(done.stdout)
+    result = parsed(call("three-spheres", "--stokes", "20", "--theta12", "30", "--json").out)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
-    words = cfddem("three-spheres", "--stokes", "20", "--theta12", "30").stdout
+    words = call("three-spheres", "--stokes", "20", "--theta12", "30", "--solver", "equations").out
     assert "FS: all separate" in words and "t*: time over (diameter / impact speed)" in words
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from command_line import cfddem, parsed
+from command_line import call, parsed
 from test_three_spheres import failed
 
 from cfddem.backend.errors import InputError
@@ -19,7 +20,7 @@ from scenarios.validation import wet as study
 
 @pytest.mark.parametrize(
     "part",
-    [study.pairs, pytest.param(study.engine_pairs, marks=pytest.mark.slow), study.thick_films],
+    [*(pytest.param(part, marks=pytest.mark.slow) for part in (study.pairs, study.engine_pairs)), study.thick_films],
     ids=lambda part: part.__name__,
 )
 def test_converged_solutions_hold(part, tmp_path) -> None:
@@ -38,12 +39,27 @@ def test_the_potential_of_a_bridge_is_the_integral_of_its_resistance(pair) -> No
     assert potential(3.0, 1.0) == potential(1.0, 1.0)
 
 
-@pytest.mark.parametrize("bridge", ["static", "deforming"])
-def test_head_on_with_zero_cut_is_the_closed_form(bridge: str) -> None:
+def test_other_films_and_a_pull_have_the_converged_solutions() -> None:
+    """Against the table of the validation: spin 1 %, restitution 0.003."""
+    exact = partial(collide_wet, angle=60.0, solver="equations")
+    assert exact(1.2, tangential="nase").spin == pytest.approx(12.3, rel=0.01)
+    assert exact(0.5, tangential="none").restitution == pytest.approx(0.117, abs=0.003)
+    assert exact(0.5, capillary=True).restitution == pytest.approx(0.0716, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("bridge", "solver"),
+    [
+        ("static", "equations"),
+        ("deforming", "particles"),
+        pytest.param("static", "particles", marks=pytest.mark.slow),  # its law set is compiled for no other plain test
+    ],
+)
+def test_head_on_with_zero_cut_is_the_closed_form(bridge: str, solver: str) -> None:
     """e = e_dry - (1 + e_dry) K/St, with K the potential at h_min; the pull of the damped contact's end aside."""
     potential = {"static": static_potential, "deforming": deforming_potential}[bridge]
     for stokes in (1.6, 2.5, 4.0):
-        run = collide_wet(stokes, bridge=bridge)
+        run = collide_wet(stokes, bridge=bridge, solver=solver)  # type: ignore[arg-type]
         lost = -potential(run.minimum_gap, 270e-6)
         assert run.restitution == pytest.approx(0.9 - 1.9 * lost / stokes, abs=2e-4)
         if bridge == "deforming":
@@ -62,18 +78,20 @@ def test_a_dry_contact_returns_its_restitution_and_rolls() -> None:
 def test_angular_momentum_passes_from_the_line_of_centres_to_the_spins() -> None:
     """Angular momentum changes only because the film pulls at the arm R and not at half the distance: below 1 %."""
     for stokes, friction in ((0.8, 0.0), (2.0, 0.05)):
-        history = collide_wet(stokes, 60.0, friction=friction).history
+        history = collide_wet(stokes, 60.0, friction=friction, solver="equations").history
         orbit = 0.5 * (2.0 * 12.7e-3 + history["gap"]) ** 2 * history["turning"]
         total = orbit + 2.0 * 0.4 * 12.7e-3**2 * history["spin"]
         assert np.ptp(total) / total[0] < 0.01
 
 
-def test_outcomes() -> None:
-    assert collide_wet(0.5).outcome == "stick"
-    assert collide_wet(0.5).separation_time is None
-    assert collide_wet(0.8, 60.0).outcome == "stick_rotate_separate"
-    assert collide_wet(2.0, 60.0).outcome == "bounce"
-    assert collide_wet(0.2, 60.0, duration=0.07).outcome == "stick"
+@pytest.mark.parametrize("solver", ["equations", pytest.param("particles", marks=pytest.mark.slow)])
+def test_outcomes(solver: str) -> None:
+    collide = partial(collide_wet, solver=solver)
+    assert collide(0.5).outcome == "stick"
+    assert collide(0.5).separation_time is None
+    assert collide(0.8, 60.0).outcome == "stick_rotate_separate"
+    assert collide(2.0, 60.0).outcome == "bounce"
+    assert collide(0.2, 60.0, duration=0.07).outcome == "stick"
 
 
 @pytest.mark.slow
@@ -132,11 +150,10 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: object, said: s
 
 
 def test_the_command_prints_json() -> None:
-    done = cfddem("wet-pair", "--stokes", "2", "--angle", "45", "--json")
-    result = parsed(done.stdout)
+    result = parsed(call("wet-pair", "--stokes", "2", "--angle", "45", "--json").out)
     assert (result["outcome"], round(result["restitution"], 3)) == ("bounce", 0.527)
 
 
 def test_a_pair_that_comes_to_rest_is_followed_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
-    assert collide_wet(0.7999999999999999, 15.0, "static", "zero").restitution == 0.0
+    assert collide_wet(0.7999999999999999, 15.0, "static", "zero", solver="equations").restitution == 0.0
     assert not recwarn.list

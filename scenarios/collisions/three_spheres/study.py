@@ -155,9 +155,9 @@ def simulate_three_spheres(collision: Collision) -> Triplet:
 
     Gaps and films are scaled with the film of the first pair, delta_12; sphere 1 flies along x.
 
-    >>> simulate_three_spheres(stokes=2, theta12=45).outcome          # sphere 1 separates after it has met sphere 3
+    >>> simulate_three_spheres(2, 45, solver="equations").outcome     # sphere 1 separates after it has met sphere 3
     'PA1'
-    >>> simulate_three_spheres(stokes=3.5, theta12=45, capillary_number=100).outcome
+    >>> simulate_three_spheres(3.5, 45, capillary_number=100, solver="equations").outcome
     'FA'
     """
     film_ratio, films, spheres = collision.film_ratio, (1.0, collision.film23, collision.film13), collision.spheres
