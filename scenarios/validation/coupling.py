@@ -231,8 +231,12 @@ def liquid_beds(curves: Curves) -> list[Row]:
             rows.append(Row(f"{name}: pressure drop over buoyant weight", bed.drop_over_weight, 1.0, 0.01))
             rows.append(_expansion(name, bed, expansions(study.case(bed.velocity)).scattered))
             rows.append(Row(f"{name}: voidage against the drag law's own balance", bed.voidage, bed.balance))
-        exponent = liquid_bed.exponent(beds) / beds[0].exponent
-        rows.append(Row(f"{material} in water: exponent over that of Richardson-Zaki", exponent, 1.0, 0.1))
+        velocities = [bed.velocity for bed in beds]
+        exponent = liquid_bed.exponent(velocities, [bed.voidage for bed in beds])
+        of_balance = liquid_bed.exponent(velocities, [bed.balance for bed in beds])
+        name = f"{material} in water: exponent over that of"
+        rows.append(Row(f"{name} Richardson-Zaki", exponent / beds[0].exponent, 1.0, 0.1))
+        rows.append(Row(f"{name} the drag law's own balance", exponent / of_balance, 1.0, 0.1))
         curves[f"liquid_bed/{material}"] = {
             "velocity": (np.array([bed.velocity for bed in beds]), "m/s"),
             "voidage": (np.array([bed.voidage for bed in beds]), "-"),

@@ -147,5 +147,9 @@ def test_stability_of_a_case_is_shown(tmp_path: Path) -> None:
     assert plain["granular_temperature"] == 0.0 < agitated["granular_temperature"]
     assert agitated["fastest"]["growth"] < 0.8 * plain["fastest"]["growth"]
     assert plain["fastest"]["wavelength"] == pytest.approx(0.033, abs=0.003)
+    assert all(wave["on_cells"] == wave["growth"] for wave in plain["waves"])  # no damping with sharp surfaces
+    smeared = parsed(call("stability", str(case), "--json", "--set", "surface=smeared").out)
+    assert all(wave["on_cells"] < wave["growth"] for wave in smeared["waves"] if wave["speed"] > 0.0)
+    assert smeared["fastest"]["wavelength"] != plain["fastest"]["wavelength"]
     done = call("stability", "packed-bed")
     assert done.code == 2 and "a fluidised liquid bed" in done.err

@@ -29,6 +29,8 @@ def eigenvalue(bed: UniformBed, wavelength: float) -> complex:
     """Growth rate with the largest real part, of the unknowns solid fraction, both velocities, and pressure."""
     k, w, eps, phi = 2j * math.pi / wavelength, bed.slip(), bed.voidage, 1.0 - bed.voidage
     s = math.exp(-0.5 * (2.0 * math.pi / wavelength * bed.kernel) ** 2)
+    once = 1.0 if bed.cell is None else math.exp(-((2.0 * math.pi / wavelength * bed.cell) ** 2) / 12.0)
+    seen, taken = (s**2, s) if bed.cell is None else (s * once, s**2)
     beta, h = bed.resistance(eps, w), 1e-6
     by_eps = (bed.resistance(eps + h, w) - bed.resistance(eps - h, w)) / (2.0 * h)
     by_w = (bed.resistance(eps, w + h) - bed.resistance(eps, w - h)) / (2.0 * h)
@@ -38,16 +40,17 @@ def eigenvalue(bed: UniformBed, wavelength: float) -> complex:
         of = (bed.density, bed.granular_temperature, bed.restitution)
         slope = (solids_pressure(phi + h, *of) - solids_pressure(phi - h, *of)) / (2.0 * h)
         viscosity = longitudinal_viscosity(phi, bed.density, bed.diameter, *of[1:])
-    force = np.array([-by_eps * s**2 * w, -(beta + by_w * w), s * (beta + by_w * w), 0.0])  # per volume of solid
+    force = np.array([-by_eps * seen * w, -(beta + by_w * w), s * (beta + by_w * w), 0.0])  # per volume of solid
+    other = phi / eps * (taken - s**2) * force  # the pressure of the drag that a particle sees, less that of the cells
     a, b = np.zeros((4, 4), complex), np.zeros((4, 4), complex)  # a x = sigma b x, x = phi, v, u, p
     a[0] = [0.0, -k * phi, 0.0, 0.0]
     b[0, 0] = 1.0
     a[1] = [k * w * s, 0.0, -k * eps, 0.0]  # of the fluid: eps' = -s phi'
     b[1, 0] = -s
-    a[2] = force + np.array([-k * slope / phi, 0.0, c * s * k * w, -s * k])
+    a[2] = force + other + np.array([-k * slope / phi, 0.0, c * s * k * w, -s * k])
     a[2, 1] += viscosity * k**2 / phi
     b[2] = [0.0, rho + c, -c * s, 0.0]
-    a[3] = -s * phi * (force + np.array([0.0, 0.0, c * s * k * w, 0.0]))
+    a[3] = -s * phi * (force + other + np.array([0.0, 0.0, c * s * k * w, 0.0]))
     a[3] -= np.array([s * beta * w * (1.0 + phi / eps), 0.0, 0.0, eps * k])
     a[3, 2] -= fluid * eps * k * w
     b[3] = [0.0, -s * phi * c, fluid * eps + s * phi * c * s, 0.0]
@@ -62,6 +65,7 @@ def eigenvalue(bed: UniformBed, wavelength: float) -> complex:
         {},
         {"kernel": 1.5 * DIAMETER},
         {"kernel": 1.5 * DIAMETER, "added_mass": 1.33},
+        {"kernel": 1.5 * DIAMETER, "added_mass": 1.33, "cell": 0.004},
         {"kernel": DIAMETER, "granular_temperature": 1.5e-3},
         {"kernel": DIAMETER, "drag": di_felice, "voidage": 0.7, "added_mass": 0.5, "granular_temperature": 2e-4},
     ],

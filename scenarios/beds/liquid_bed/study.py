@@ -163,6 +163,6 @@ def _layers(simulation: Simulation) -> np.ndarray:
     return np.asarray(solids / (column.floor_area * np.diff(edges)))
 
 
-def exponent(beds: list[FluidisedBed]) -> float:
+def exponent(velocities: list[float], voidages: list[float]) -> float:
     """Slope of log U over log voidage."""
-    return float(np.polyfit(np.log([bed.voidage for bed in beds]), np.log([bed.velocity for bed in beds]), 1)[0])
+    return float(np.polyfit(np.log(voidages), np.log(velocities), 1)[0])
