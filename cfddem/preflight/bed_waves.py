@@ -118,7 +118,7 @@ def lines(waves: BedWaves) -> list[str]:
     columns = 4 + agitated
     headings = ("wavelength", "speed", "growth", "on cells", "agitated")[:columns]
     out += ["", *table([row[:columns] for row in rows], headings, right=range(columns), widths=(12, 9, 9, 9, 9))]
-    damping = "less the damping of the cells" if found.bed.cell is not None else "the same with sharp surfaces"
+    damping = "less the damping of the cells" if waves.bed.cell is not None else "the same with sharp surfaces"
     meaning = f"growth: by theory; on cells: {damping}"
     out += ["", meaning + "; agitated: on cells, with agitation" * agitated]
     fastest = numbers["fastest"]
