@@ -128,7 +128,7 @@ def assert_goes_on(run: Path, one: Path, ranks: int) -> None:
     [
         pytest.param("raise", 1, "cfddem: rank 1: ValueError: something unforeseen", marks=pytest.mark.slow),
         ("message", 1, "cfddem: rank 1: ValueError: something unforeseen"),
-        ("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run"),
+        pytest.param("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run", marks=pytest.mark.slow),
         pytest.param("exit0", 3, "rank 1: sys.exit(0) was called within the run", marks=pytest.mark.slow),
         ("kill", 9, ""),
     ],
