@@ -246,6 +246,7 @@ def test_any_number_of_ranks_has_the_bits_of_one(name: str, shape: Shape) -> Non
         assert_same_bits(found, alone)
 
 
+@pytest.mark.slow  # as plain tests: bricks of particles alone, and fields between both divisions
 def test_bricks_follow_a_bed_that_leaves_one_side(monkeypatch: pytest.MonkeyPatch) -> None:
     """All particles go to one side: space is cut anew, work is equal after each cut, and bits are those of one process.
 

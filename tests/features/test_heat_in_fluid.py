@@ -112,7 +112,7 @@ def test_conduction_between_two_walls_is_linear_and_what_they_give_is_stored() -
 @pytest.mark.parametrize("to_cell", [False, True])
 def test_walls_with_a_flux_and_with_a_coefficient_balance(to_cell: bool) -> None:
     """In the end the flux in leaves through the wall with a coefficient, whose surface, or cell, is at 300 K + q/h."""
-    heat = at_rest({"x_low": FluxWall(6.0), "x_high": ExchangeWall(2.0, 300.0, 1.0, to_cell)}, 4000.0, 20.0)
+    heat = at_rest({"x_low": FluxWall(6.0), "x_high": ExchangeWall(2.0, 300.0, 1.0, to_cell)}, 4000.0, 40.0)
     slope = 6.0 / CONDUCTIVITY * 0.01
     beyond = 7.0 if to_cell else 7.5
     assert heat.value[0, 0] == pytest.approx(303.0 + slope * (beyond - np.arange(8)), abs=1e-4)

@@ -97,8 +97,8 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 LONG = {
-    "averages", "cluster", "contact-law", "layers", "measure", "programs", "read-results", "report", "sweep",
-    "user-law", "walls", "wet-particles",
+    "averages", "cluster", "contact-law", "layers", "measure", "own-force", "programs", "read-results", "report",
+    "smooth-walls", "sweep", "user-law", "walls", "wet-particles",
 }  # fmt: skip
 """Pages with many loops to compile, or processes to start."""
 

@@ -89,7 +89,7 @@ def test_a_moving_wall_puts_energy_in_through_its_bridges() -> None:
     places = np.array([[3.0 * RADIUS * n, 0.0, RADIUS + 0.5 * FILM] for n in range(5)])
     spheres = make_particles(places, RADIUS, GRAIN.density, velocity=draw.normal(0.0, 0.01, (5, 3)))
     given: dict[str, Any] = {"walls": [Plane(velocity=(0.1, 0.0, 0.0))], "energies": True}
-    run, bridges = bridged(spheres, replace(SYRUP, cut="zero"), **given)
+    run, bridges = bridged(spheres, SYRUP, **given)
     assert bridges.count == 5
     remainder, done, put_in = ledger(run, run.time_scales(0.1).recommended, 500)
     assert done["walls"] > 0.0 and done["bridge"] > 0.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from wet_spheres import FILM, GRAIN, RADIUS, THIN, bridged
 
@@ -31,7 +29,7 @@ def test_dry_solids_that_overlap_form_no_bridge() -> None:
     """Two spheres, and a sphere on a wall."""
     places = np.array([[0.0, 0.0, 0.999 * RADIUS], [1.999 * RADIUS, 0.0, 0.999 * RADIUS]])
     spheres = make_particles(places, RADIUS, GRAIN.density)
-    run, bridges = bridged(spheres, replace(THIN, cut="zero"), 0.0, walls=[Plane()])
+    run, bridges = bridged(spheres, THIN, 0.0, walls=[Plane()])
     run.advance(1e-6, 20)
     assert bridges.formed == bridges.broken == bridges.count == 0
 

@@ -30,7 +30,7 @@ def shared(ranks: int, *case: Any) -> tuple[dict[str, np.ndarray], int, int]:
 
 @pytest.mark.parametrize(
     "kind",
-    [pytest.param(kind, marks=[pytest.mark.slow] * (kind in ("dry", "polydisperse"))) for kind in cluster_runs.KINDS],
+    [pytest.param(kind, marks=[pytest.mark.slow] * (kind != "moving_mesh")) for kind in cluster_runs.KINDS],
 )
 def test_two_ranks_have_the_bits_of_one(kind: str) -> None:
     """Every field of particles and pairs, one of a user among them; particles change ranks several times."""

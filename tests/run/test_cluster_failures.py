@@ -128,7 +128,7 @@ def assert_goes_on(run: Path, one: Path, ranks: int) -> None:
     [
         pytest.param("raise", 1, "cfddem: rank 1: ValueError: something unforeseen", marks=pytest.mark.slow),
         ("message", 1, "cfddem: rank 1: ValueError: something unforeseen"),
-        ("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run"),
+        pytest.param("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run", marks=pytest.mark.slow),
         pytest.param("exit0", 3, "rank 1: sys.exit(0) was called within the run", marks=pytest.mark.slow),
         ("kill", 9, ""),
     ],
@@ -252,8 +252,9 @@ def _can_mount() -> bool:
     return program is not None and subprocess.run(words, capture_output=True, check=False).returncode == 0
 
 
+@pytest.mark.slow  # as plain tests: a full disk in one process, and ranks of which one fails
 @pytest.mark.skipif(not _can_mount(), reason="a small disk cannot be mounted here")
-@pytest.mark.parametrize("room", ["400k", pytest.param("100k", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("room", ["400k", "100k"])
 def test_a_full_disk_ends_all_ranks_and_leaves_a_whole_folder(home: Path, tmp_path: Path, room: str) -> None:
     """Rank 0 writes; on a larger disk the run goes on to the end of one process."""
     shutil.copy(home / "case.toml", tmp_path)

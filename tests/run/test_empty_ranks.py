@@ -61,9 +61,8 @@ GAS: dict[str, Any] = {
     "laws__drag": "beetstra",
 }  # fmt: skip
 
-ALONE_WITH_ALL = "one bead with memory and all forces"
 FEW = {
-    ALONE_WITH_ALL: case_of(
+    "one bead with memory and all forces": case_of(
         BEADS, **SMALL, bed__positions=ALONE, laws__added_mass=0.5, laws__history="mei_adrian", run__energy_budget=True,
         laws__agitation="pseudo_turbulence", **ALL_FORCES,
     ),
@@ -130,8 +129,7 @@ def in_one_process(name: str) -> tuple[dict[str, np.ndarray], dict[str, float]]:
 @pytest.mark.parametrize(
     ("name", "ranks"),
     [(name, 2) for name in FEW]
-    + [(ALONE_WITH_ALL, 3)]
-    + [pytest.param(name, 3, marks=pytest.mark.slow) for name in FEW if name != ALONE_WITH_ALL],
+    + [pytest.param(name, 3, marks=[pytest.mark.slow] * ("mixture" not in name)) for name in FEW],
 )
 def test_ranks_without_a_particle_share_a_case(name: str, ranks: int) -> None:
     """Against one process, and half the way each on these ranks and on one."""
@@ -149,7 +147,9 @@ def test_ranks_without_a_particle_share_a_case(name: str, ranks: int) -> None:
 
 def test_a_folder_of_ranks_without_a_particle_is_that_of_one_process(tmp_path: Path) -> None:
     """Snapshots and history; begun on two ranks, resumed on three."""
-    case = FEW[ALONE_WITH_ALL].with_(**{"run.until": 0.004, "run.every": 0.002, "run.history_every": 0.001})
+    case = FEW["one bead with memory and all forces"].with_(
+        **{"run.until": 0.004, "run.every": 0.002, "run.history_every": 0.001}
+    )
     Run.begin(case, tmp_path / "one").go()
     Run.resume(tmp_path / "one", until=0.006).go()
     on_ranks(2, lambda communicator: Run.begin(case, tmp_path / "many", communicator=communicator).go())
