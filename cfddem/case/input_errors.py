@@ -96,11 +96,10 @@ def _without_moved_keys(
             unknown.setdefault(key[:-1], []).append(str(key[-1]))
     errors: list[tuple[Key, InputError]] = []
     for table, words in unknown.items():
-        homes = [table for table in model.model_fields if _has_all(model.model_fields[table], words)]
-        missing = [table for table in homes if isinstance(values, Mapping) and table not in values]
-        home = next(
-            iter(missing or (table for table in homes if "." in _header(table, model.model_fields[table]))), None
-        )
+        homes = [name for name, field in model.model_fields.items() if _has_all(field, words)]
+        missing = [name for name in homes if isinstance(values, Mapping) and name not in values]
+        of_names = [name for name in homes if "." in _header(name, model.model_fields[name])]  # as [material.NAME]
+        home = next(iter(missing or of_names), None)
         if home is None:
             continue
         owner, wrong = model.model_fields[home], [str(key[-1]) for key in reported if key and key[:-1] == table]

@@ -61,7 +61,7 @@ def spread(weights, sums, x, y, volume, value):
 
 @serial
 def to_faces(particles, volume, dx, u, w, known_u, known_w):
-    """Velocities of the particles on the faces; `known` marks the faces with enough liquid around them."""
+    """Velocities of the particles on the faces; `known_u`, `known_w` mark faces with enough liquid around them."""
     weight_u, weight_w = np.zeros_like(u), np.zeros_like(w)
     u[:] = 0.0
     w[:] = 0.0
