@@ -92,13 +92,15 @@ def check_patches(case: Case) -> Iterator[Issue]:
 
 def _check_holes(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
     """Check that faces of cells resolve the jets of holes."""
-    across = (patch.diameter or math.inf) / max(case.column.cell_edges[:2])
+    widest = max(case.column.cell_edges[:2])
+    across = (patch.diameter or math.inf) / widest
     if patch.shape == "holes" and across < FEWEST_OF_OPENING:
         yield Issue(
             "note", f"patch.{name}.diameter",
             f"{across:.2g} cells across a hole: what enters is exact, but a jet begins at the mean velocity of its "
             "faces and has less momentum",
-            f"for jets of their own, cells of {(patch.diameter or 0.0) / FEWEST_OF_OPENING:.2g} m",
+            f"only holes of at least {FEWEST_OF_OPENING * widest:.2g} m, {FEWEST_OF_OPENING:g} cells, have jets of "
+            "their own",
         )  # fmt: skip
 
 
