@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
+from cfddem.case.holes import samples
 from cfddem.case.patches import ENDS, PLANES, CasePatch, along, lengths_of, middle_of, on_the_side, open_area_of
 from cfddem.case.tables import CaseTables
 from cfddem.fluid.cut_cells import section
@@ -68,7 +69,8 @@ def patch_faces(case: CaseTables, side: str) -> PatchFaces:
         opens = bool(case.vessel) and side not in ENDS
         if opens and patch.brings and closed:  # openings lie apart, and two may still meet in a face
             faces.shares[name][np.any(closed, axis=0)] = 0.0
-        if patch.brings and (patch.mass_flow is not None or opens):  # exactly, also where faces do not follow the edge
+        exact = patch.mass_flow is not None or opens or patch.shape == "holes"
+        if patch.brings and exact:  # also where faces do not follow the edge
             area, face = open_area_of(case, patch), grid_of(case).face_area(PLANES[side][0])
             faces.shares[name][:] *= area / (float((faces.shares[name] * _apertures(case, side)).sum()) * face)
     beside = np.maximum(1.0 - sum(entering), 0.0)
@@ -88,6 +90,8 @@ def _apertures(case: CaseTables, side: str) -> Array:
 
 def coverage(case: CaseTables, patch: CasePatch) -> Array:
     """Velocity through the open part of each face of a side over that of the patch [-]."""
+    if patch.shape == "holes":
+        return _through_holes(case, patch)
     (width, depth), (axis, high), grid = lengths_of(case, patch.side), PLANES[patch.side], grid_of(case)
     nx, ny = (grid.cells[d] for d in along(patch.side))
     x = (np.arange(nx * PLACES) + 0.5) * width / (nx * PLACES)
@@ -102,6 +106,16 @@ def coverage(case: CaseTables, patch: CasePatch) -> Array:
         sums = [values.reshape(PLACES, nx, PLACES).sum(axis=(0, 2)) for values in (weight, inside)]
         shares[row] = sums[0] / np.maximum(sums[1], 1.0)
     return shares
+
+
+def _through_holes(case: CaseTables, patch: CasePatch) -> Array:
+    """The same of holes, which may be smaller than a face: by places in each of them."""
+    x, y = samples(patch.places(middle_of(case, patch.side)), patch.diameter or 0.0)
+    part, inside = patch.area / len(x), on_the_side(case, patch.side, x, y)
+    free = _apertures(case, patch.side) * grid_of(case).face_area(PLANES[patch.side][0])
+    area = np.zeros(free.shape)
+    np.add.at(area, face_at(case, patch.side, x[inside], y[inside], np.zeros(inside.sum())), part)
+    return np.divide(area, free, out=np.zeros_like(area), where=free > 0.0)
 
 
 def _covered(case: CaseTables, patch: CasePatch, share: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, shown
 from cfddem.case.bed import NonNegative, Positive, at_times, check_times, speeds_of
+from cfddem.case.holes import in_rows, refuse_holes, samples
 from cfddem.case.materials import Checked
 
 PLACES = 120
@@ -19,17 +20,20 @@ PLACES = 120
 
 Array = NDArray[np.float64]
 Place = tuple[float, float]
+Count = Annotated[int, Field(ge=1, le=10000)]
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "whole": (),
     "disc": ("centre", "diameter"),
     "ring": ("centre", "diameter", "inner_diameter"),
     "box": ("centre", "size"),
+    "holes": ("centre", "diameter", "holes", "pitch"),
 }
 """Keys of each shape beside those of all patches."""
 
 NEEDED: Mapping[str, tuple[str, ...]] = {
     "whole": (), "disc": ("diameter",), "ring": ("diameter", "inner_diameter"), "box": ("size",),
+    "holes": ("diameter", "holes"),
 }  # fmt: skip
 
 OF_KINDS: Mapping[str, tuple[str, ...]] = {
@@ -55,13 +59,19 @@ class CasePatch(Checked):
         "floor",
         description="side of the column on which it is; through the wall of a vessel a straight duct leads to it",
     )
-    shape: Literal["whole", "disc", "ring", "box"] = Field("whole", description="the whole side, or a part of it")
+    shape: Literal["whole", "disc", "ring", "box", "holes"] = Field(
+        "whole", description="the whole side, a part of it, or the holes of a distributor plate"
+    )
     centre: Place | None = Field(
         None, description="middle of the patch: (x, y), or (y, z) or (x, z) on a side; default: that of the side [m]"
     )
-    diameter: Positive | None = Field(None, description="diameter of a disc, or outer one of a ring [m]")
+    diameter: Positive | None = Field(None, description="diameter of a disc or a hole, or outer one of a ring [m]")
     inner_diameter: Positive | None = Field(None, description="inner diameter of a ring [m]")
     size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, along the axes of centre [m]")
+    holes: Count | tuple[Place, ...] | None = Field(
+        None, description="number of holes, in rows at 60 degrees around centre, or the place (x, y) of each [-, m]"
+    )
+    pitch: Positive | None = Field(None, description="distance of neighbouring holes, for a number of them [m]")
     velocity: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
         None, description="superficial velocity of an inlet, into the column: a number, or [time, velocity] pairs [m/s]"
     )
@@ -109,6 +119,8 @@ class CasePatch(Checked):
             raise InputError("inner_diameter", self.inner_diameter, f"below the diameter, {self.diameter:g} m")
         if self.profile == "parabolic" and self.shape != "disc":
             raise InputError("profile", self.profile, f'uniform for shape = "{self.shape}"', "a disc may be parabolic")
+        if self.shape == "holes":
+            refuse_holes(self)
         return self
 
     def by_velocity(self, density: float, area: float) -> CasePatch:
@@ -160,6 +172,11 @@ class CasePatch(Checked):
 
         radius  of the discs [m]
         """
+        if self.shape == "holes":
+            away = np.full(np.shape(x + y), math.inf)
+            for place in self.places(middle):
+                away = np.minimum(away, np.hypot(x - place[0], y - place[1]))
+            return np.asarray(away + radius <= 0.5 * (self.diameter or 0.0))
         across, beside = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
         if self.shape == "whole":
             return np.ones(np.shape(across + beside), bool)
@@ -173,9 +190,17 @@ class CasePatch(Checked):
                 inside = inside & (away - radius >= 0.5 * self.inner_diameter)
         return np.asarray(inside)
 
+    def places(self, middle: Place) -> Array:
+        """Centres of its holes (N, 2) [m]; `middle` as of `weight`."""
+        if isinstance(self.holes, int):
+            return np.array(self.centre or middle) + in_rows(self.holes, self.pitch or 0.0)
+        return np.array(self.holes or (), float).reshape(-1, 2)
+
     @property
     def area(self) -> float:
         """Area of the patch; infinite for a whole side [m2]."""
+        if self.shape == "holes":
+            return len(self.places((0.0, 0.0))) * 0.25 * math.pi * (self.diameter or 0.0) ** 2
         if self.size is not None:
             return math.prod(self.size)
         return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf
@@ -220,6 +245,9 @@ def _sampled(case: Any, patch: CasePatch) -> tuple[Array, NDArray[np.bool_]]:
     """Weights of a patch at places on and around it, and which of these lie on its side of the vessel."""
     width, depth = lengths_of(case, patch.side)
     middle = patch.centre or (0.5 * width, 0.5 * depth)
+    if patch.shape == "holes":
+        x, y = samples(patch.places(middle), patch.diameter or 0.0)
+        return np.ones(len(x)), on_the_side(case, patch.side, x, y)
     edges = patch.size or (2.0 * width, 2.0 * depth)
     reach = patch.diameter or float(max(edges))
     around = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach

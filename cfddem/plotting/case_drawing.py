@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -179,10 +180,11 @@ def _patches(axes: Axes, case: Case) -> None:
             continue
         middle = patch.centre[0] if patch.centre else 0.5 * width
         half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
+        centres = patch.places(middle_of(case, patch.side))[:, 0] if patch.shape == "holes" else [middle]
         z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
         inner = 0.5 * (patch.inner_diameter or 0.0)
-        for side in (-1.0, 1.0):
-            x = middle + side * inner, middle + side * half
+        for side, centre in product((-1.0, 1.0), centres):
+            x = centre + side * inner, centre + side * half
             axes.plot(x, [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
         words = f"{name} {patch.highest:.3g} m/s" if patch.brings else name
         lower = (-0.04 if patch.side == "floor" else 0.02) * height * (1.0 + number % 2)

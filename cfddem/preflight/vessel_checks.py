@@ -54,7 +54,8 @@ def check_patches(case: Case) -> Iterator[Issue]:
     """Check that patches lie on the open part of floor or lid, and that cells resolve openings in a vessel."""
     of_lid = {name: patch for name, patch in case.patch.items() if patch.side == "lid"}
     leaves = case.column.ends == "flow" and _is_open(case, [*of_lid.values()])
-    if case.fastest_inflow > 0.0 and of_lid and not leaves and "outlet" not in {e.kind for e in case.patch.values()}:
+    enters = case.fastest_inflow > 0.0 or any(e.kind == "inlet" and not e.brings for e in case.patch.values())
+    if enters and of_lid and not leaves and "outlet" not in {e.kind for e in case.patch.values()}:
         yield Issue(
             "error", f"patch.{next(iter(of_lid))}",
             "the patches of the lid leave no part of it open: what enters has to leave",
@@ -68,6 +69,7 @@ def check_patches(case: Case) -> Iterator[Issue]:
         )  # fmt: skip
     for name, patch in case.patch.items():
         yield from _check_drain(case, name, patch)
+        yield from _check_holes(case, name, patch)
         if patch.side not in ENDS:
             yield from _check_opening(case, name, patch)
             continue
@@ -86,6 +88,20 @@ def check_patches(case: Case) -> Iterator[Issue]:
                 f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and {outside}",
                 "make it smaller, or move its centre",
             )  # fmt: skip
+
+
+def _check_holes(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:
+    """Check that faces of cells resolve the jets of holes."""
+    widest = max(case.column.cell_edges[:2])
+    across = (patch.diameter or math.inf) / widest
+    if patch.shape == "holes" and across < FEWEST_OF_OPENING:
+        yield Issue(
+            "note", f"patch.{name}.diameter",
+            f"{across:.2g} cells across a hole: what enters is exact, but a jet begins at the mean velocity of its "
+            "faces and has less momentum",
+            f"only holes of at least {FEWEST_OF_OPENING * widest:.2g} m, {FEWEST_OF_OPENING:g} cells, have jets of "
+            "their own",
+        )  # fmt: skip
 
 
 def _check_drain(case: Case, name: str, patch: CasePatch) -> Iterator[Issue]:

@@ -12,29 +12,38 @@ from cfddem.plotting.curves import GREY, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
 
 WALL = "#222222"
 """Colour of walls."""
 
+CUBIC_MILLIMETRES = 1e9
+"""In a cubic metre."""
 
-def draw_spheres(axes: Axes, run: RunData, case: Case, time: float, reach: float, size: float, fastest: float) -> float:
-    """Spheres near the middle plane, coloured by their upward velocity.
+
+def draw_spheres(
+    axes: Axes, run: RunData, case: Case, time: float, reach: float, size: float, most: float, by: str = "rise"
+) -> tuple[float, PathCollection]:
+    """Spheres near the middle plane, coloured by their upward velocity or by the liquid that they carry.
 
     time     of the snapshot, or near it [s]
     reach    distance of centres from the plane, over the diameter [-]
     size     of a sphere on the page [points squared]
-    fastest  velocity at the ends of the colours [m/s]
-    returns  the time of the snapshot [s]
+    most     velocity [m/s] or liquid [mm3] at the end of the colours
+    by       "rise" or "liquid"
+    returns  the time of the snapshot [s], and the spheres, for a bar of colours
     """
     n = int(np.abs(run.times - time).argmin())
     particles = run.particles(n)
-    position, up = particles["position"], particles["velocity"][:, 2]
+    position = particles["position"]
     near = np.abs(position[:, 1] - 0.5 * case.column.width) < reach * case.bed.diameter
-    axes.scatter(
-        position[near, 0], position[near, 2], s=size, c=up[near], cmap="RdBu_r", vmin=-fastest, vmax=fastest,
-        linewidths=0.3, edgecolors=GREY,
+    rises = by == "rise"
+    value = particles["velocity"][:, 2] if rises else particles["liquid_carried"] * CUBIC_MILLIMETRES
+    spheres = axes.scatter(
+        position[near, 0], position[near, 2], s=size, c=value[near], cmap="RdBu_r" if rises else "YlGnBu",
+        vmin=-most if rises else 0.0, vmax=most, linewidths=0.3, edgecolors=GREY,
     )  # fmt: skip
-    return float(run.times[n])
+    return float(run.times[n]), spheres
 
 
 def draw_vessel(axes: Axes, case: Case, top: float) -> None:

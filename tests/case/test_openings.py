@@ -117,6 +117,22 @@ def test_what_enters_through_a_side_leaves_through_another_to_round_off(vessel: 
         assert entering == pytest.approx(2.0 * DISC, rel=1e-9 if vessel else 2e-3)
 
 
+@pytest.mark.parametrize("vessel", VESSELS.values(), ids=VESSELS)
+def test_what_enters_through_the_holes_of_a_plate_leaves_through_the_lid_to_round_off(vessel: Any) -> None:
+    """Seven holes of a tenth of a cell in a floor without other inlets."""
+    plate = {"kind": "inlet", "shape": "holes", "holes": 7, "pitch": 8e-3, "diameter": 1e-3, "velocity": 20.0}
+    case = made(vessel=vessel, patch={"plate": plate, "top": {"kind": "outlet", "side": "lid"}})
+    grid = grid_of(case)
+    x, y, z = flow_in(case)[1]
+    balance = np.diff(x, axis=2) + np.diff(y, axis=1) + np.diff(z, axis=0)
+    print(f"in a cell {np.abs(balance).max() / np.abs(z).max():.2g} of the largest flux are lost")
+    assert np.abs(balance).max() < 1e-12 * max(np.abs(each).max() for each in (x, y, z))
+    assert z[0].sum() == pytest.approx(7 * 20.0 * math.pi / 4.0 * 1e-6, rel=1e-12)
+    assert z[-1].sum() == pytest.approx(z[0].sum(), rel=1e-12)
+    reached = np.hypot(*(each[0] - 0.04 for each in grid.centres()[:2])) < 0.008 + math.sqrt(0.5) * grid.spacing[0]
+    assert not z[0][~np.broadcast_to(reached, z[0].shape)].any()
+
+
 @pytest.mark.parametrize(
     ("low", "high"), [("floor", "lid"), ("lid", "floor"), ("x_low", "x_high"), ("y_high", "y_low")]
 )

@@ -227,7 +227,8 @@ def test_the_flow_through_a_patch_is_its_velocity_times_its_area():
 
 def inflow(case: Case) -> float:
     """Flow through the floor at 0.5 s [m3/s]."""
-    open_part = Boundaries(grid_of(case), boundaries_of(case)).cut.aperture[2][2, 2:-3, 2:-3]
+    aperture = Boundaries(grid_of(case), boundaries_of(case)).cut.aperture
+    open_part = aperture[2][2, 2:-3, 2:-3] if case.vessel else 1.0
     return float((faces_of(case) * open_part).sum() * grid_of(case).face_area(2))
 
 
@@ -301,6 +302,90 @@ def test_the_floor_beneath_an_inlet_lets_nothing_through(given):
     assert outside.any() and (both - alone)[outside] == pytest.approx(1.0)
 
 
+PLATE: dict[str, Any] = {"kind": "inlet", "shape": "holes", "diameter": 3e-3, "velocity": 20.0}
+
+
+@pytest.mark.parametrize(
+    ("holes", "number"),
+    [
+        ({"holes": 19, "pitch": 0.011}, 19),
+        ({"holes": 1, "pitch": 0.011, "centre": [0.071, 0.083]}, 1),
+        ({"holes": [[0.062, 0.081], [0.0801, 0.09], [0.1, 0.0703]]}, 3),
+        ({"holes": 61, "pitch": 3e-3}, 61),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("vessel", ["cone", "column"])
+def test_the_flow_through_the_holes_of_a_plate_is_that_of_their_area(holes, number, vessel):
+    """Holes of 0.3 cells, in the cone also in cut cells: by velocity and by mass flow, beside a nozzle and on a floor
+    with a flow of its own."""
+    base: dict[str, Any] = {"vessel": None} if vessel == "column" else {}
+    area = number * math.pi / 4.0 * 3e-3**2
+    plate = made(patch={"plate": PLATE | holes}, **base)
+    assert inflow(plate) == pytest.approx(20.0 * area, rel=1e-12)
+    assert plate.patch["plate"].area == pytest.approx(area)
+    rises = {"velocity": None, "mass_flow": [[0.0, 0.0], [1.0, 0.004]]}
+    assert inflow(made(patch={"plate": PLATE | holes | rises}, **base)) == pytest.approx(0.002 / 1.2, rel=1e-12)
+    nozzle = made().patch["nozzle"].model_dump(exclude_unset=True)
+    both = made(patch={"plate": PLATE | holes, "nozzle": nozzle}, **base)
+    assert inflow(both) - inflow(made(**base)) == pytest.approx(20.0 * area, rel=1e-9)
+    floor = {"bed__inlet_velocity": 1.0} | base
+    alone = inflow(made(patch={"top": {"kind": "outlet", "side": "lid"}}, **floor))
+    opened = inflow(made(patch={"plate": PLATE | holes}, **floor))
+    assert opened == pytest.approx(inflow(plate) + alone - area, rel=1e-6)
+    assert Case.from_text(plate.to_toml()) == plate
+
+
+def test_holes_lie_in_rows_about_the_centre_and_only_faces_above_them_have_a_flow():
+    case = made(vessel=None, patch={"plate": PLATE | {"holes": 37, "pitch": 0.012}})
+    places = case.patch["plate"].places((0.08, 0.08))
+    apart = np.linalg.norm(places[:, None] - places, axis=-1) + np.eye(37)
+    assert apart.min() == pytest.approx(0.012) and places.mean(axis=0) == pytest.approx([0.08, 0.08])
+    assert np.linalg.norm(places - 0.08, axis=1).max() == pytest.approx(0.036)
+    reached = np.zeros((16, 16), bool)
+    for corner in np.stack(np.meshgrid([-1.5e-3, 1.5e-3], [-1.5e-3, 1.5e-3]), axis=-1).reshape(-1, 2):
+        column, row = np.floor((places + corner) / 0.01).astype(int).T
+        reached[row, column] = True
+    enters = faces_of(case) > 0.0
+    assert enters.any() and not (enters & ~reached).any()
+    x, y = (places[:5] + np.array([0.0, 1e-3])).T
+    assert case.patch["plate"].holds(x, y, (0.08, 0.08), 0.4e-3).all()
+    assert not case.patch["plate"].holds(x, y, (0.08, 0.08), 0.6e-3).any()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"holes": 7}, "patch.plate.pitch: must be given for a number of holes"),
+        ({"holes": 7, "pitch": 2e-3}, "patch.plate.pitch.*at least 0.003 m apart; the nearest two are 0.002 m"),
+        ({"holes": [[0.08, 0.08], [0.082, 0.08]]}, "patch.plate.holes.*the nearest two are 0.002 m apart"),
+        ({"holes": [[0.08, 0.08]], "pitch": 0.01}, "patch.plate.pitch = 0.01: must be left out where holes are listed"),
+        ({"holes": 0, "pitch": 0.01}, "patch.plate.holes"),
+        ({"pitch": 0.01}, "patch.plate.holes: must be given"),
+        ({"holes": 7, "pitch": 0.01, "velocity": None, "pressure": 5.0}, "patch.plate.shape.*by velocity or mass_flow"),
+        ({"holes": 7, "pitch": 0.01, "kind": "outlet", "velocity": None}, "patch.plate.shape.*by velocity"),
+        ({"holes": 7, "pitch": 0.01, "side": "x_low"}, "patch.plate.side.*floor or lid"),
+        ({"holes": 7, "pitch": 0.01, "profile": "parabolic"}, "patch.plate.profile"),
+        ({"shape": "disc", "pitch": 0.01}, "patch.plate.pitch.*left out for shape"),
+    ],
+    ids=str,
+)
+def test_a_plate_that_has_no_holes_or_holes_that_overlap_is_refused_in_a_line(given, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        made(patch={"plate": PLATE | given})
+    assert len(str(refusal.value)) < 300 and "\n" not in str(refusal.value)
+
+
+def test_the_check_tells_of_holes_beyond_the_floor_and_of_jets_that_cells_do_not_resolve():
+    far = made(patch={"plate": PLATE | {"holes": [[0.08, 0.08], [0.12, 0.08]]}})
+    found = [each for each in preflight(far).issues if each.key.startswith("patch")]
+    assert any(each.severity == "warning" and "50 % of it lies outside" in each.reason for each in found)
+    (jets,) = [each for each in found if each.key == "patch.plate.diameter"]
+    assert jets.severity == "note" and "0.3 cells" in jets.reason
+    wide = made(patch={"plate": PLATE | {"holes": 1, "pitch": 0.03, "diameter": 0.025}})
+    assert not [each for each in preflight(wide).issues if each.key == "patch.plate.diameter"]
+
+
 def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it():
     plate = {"kind": "wall", "side": "floor", "shape": "ring", "diameter": 0.06, "inner_diameter": 0.0001}
     nozzle = made().patch["nozzle"].model_dump(exclude_unset=True)
@@ -330,6 +415,17 @@ def test_a_lid_may_be_closed_but_for_its_outlets():
     side = next(each for each in boundaries.sides if each.name == "z_high")
     at = np.flatnonzero(side.outlet[2:-3, 2:-3].any(axis=0))
     assert boundaries.has_outlet and set(at) <= {3, 4, 5, 6, 9, 10, 11, 12} and {4, 5, 10, 11} <= set(at)
+
+
+@pytest.mark.parametrize("driven", [{"velocity": 1.0}, {"velocity": None, "pressure": 5.0}], ids=str)
+def test_a_lid_that_several_walls_close_together_is_found_for_every_kind_of_inlet(driven):
+    half = {"kind": "wall", "side": "lid", "shape": "box", "size": [0.08, 0.16]}
+    left, right = half | {"centre": [0.04, 0.08]}, half | {"centre": [0.12, 0.08]}
+    for walls, closed in (({"left": left}, False), ({"left": left, "right": right}, True)):
+        case = made(patch={"air": {"kind": "inlet"} | driven} | walls)
+        found = [each for each in preflight(case).issues if each.key == "patch.left" and each.severity == "error"]
+        assert len(found) == closed
+        assert all("what enters has to leave" in each.reason for each in found)
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,33 @@ def test_the_pressure_drop_of_a_bubbling_bed_is_its_weight(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_weight_of_a_bubbling_bed_in_a_cone_is_carried_by_its_floor_and_its_wall(tmp_path):
+    """Pressure on the floor, pressure and stress on the cone, contacts with both, and what accelerates bed and gas,
+    over 0.2 s."""
+    count, speed = 1600, 0.75
+    cone = {"shape": "cone", "radius": 0.0072, "length": 0.03}
+    case = bed_of(count, cone).with_(**{"run.wall_forces": True})
+    run = run_case(case, tmp_path / "bed")
+    history, times = run.history, run.times
+    first, last = 2, len(times) - 1
+    inside = (history["time"] > times[first] - 1e-9) & (history["time"] < times[last] + 1e-9)
+    at_walls = sum(history[name] for name in ("floor_force_z", "side_force_z", "side_fluid_force_z"))
+    pushed, lasted = history["pressure_drop"] * case.floor_area, times[last] - times[first]
+    carried = np.trapezoid((pushed - at_walls)[inside], history["time"][inside]) / lasted
+
+    def momentum(place: int) -> float:
+        found = run.particles(place)
+        return float((1000.0 * sphere_volume(found["radius"].astype(float)) * found["velocity"][:, 2]).sum())
+
+    weight = count * sphere_volume(0.6e-3) * (1000.0 - 1.2) * 9.81
+    gas = 1.2 * speed**2 * case.floor_area * (1.0 - case.floor_area / case.area_of("lid"))  # slows down in the cone
+    expected = weight + (momentum(last) - momentum(first)) / lasted - gas
+    share = np.trapezoid(history["side_fluid_force_z"][inside], history["time"][inside]) / lasted / weight
+    print(f"carried / expected {carried / expected:.5f}; the pressure on the cone is {share:.3f} of the weight")
+    assert carried == pytest.approx(expected, rel=5e-3) and share < -0.1
+
+
+@pytest.mark.slow
 def test_a_bed_in_a_round_column_accounts_for_its_energy(tmp_path):
     """Works of the terms of the fluid add up to its kinetic energy; the remainder is below 1 % of what was put in."""
     case = bed_of(800, {"shape": "cylinder"}).with_(**{"run.until": 0.02, "run.energy_budget": True})

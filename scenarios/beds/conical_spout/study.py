@@ -84,7 +84,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     """Spheres near the middle plane at some times, and the voidage on the axis as the velocity falls."""
     drawn, axes = panels(len(times) + 1, width=11.0, height=3.2, width_ratios=[*[1.0] * len(times), 1.5])
     for axis, time in zip(axes, times):
-        shown = draw_spheres(axis, run, case, time, reach=1.0, size=20.0, fastest=0.6)
+        shown, _ = draw_spheres(axis, run, case, time, reach=1.0, size=20.0, most=0.6)
         draw_vessel(axis, case, 0.6 * case.column.height)
         axis.set_title(f"{shown:.2f} s, {case.patch['nozzle'].speed(shown):.3g} m/s", fontsize=9.5)
     seen, curve = spouting(run, case), axes[-1]

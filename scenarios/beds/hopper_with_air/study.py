@@ -108,7 +108,7 @@ def figure(runs: Sequence[RunData], path: Path) -> None:
     for run, axis, colour in zip(runs, axes, COLOURS):
         case = case_of(run)
         found = discharge(run, case)
-        draw_spheres(axis, run, case, case.run.until, reach=0.75, size=14.0, fastest=0.6)
+        draw_spheres(axis, run, case, case.run.until, reach=0.75, size=14.0, most=0.6)
         draw_vessel(axis, case, 0.09)
         axis.set_title(f"{found.pressure:g} Pa", fontsize=9.5, color=colour)
         words = f"{found.pressure:g} Pa: {found.rate:.3g} kg/s"

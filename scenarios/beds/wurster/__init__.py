@@ -1,5 +1,5 @@
-"""A Wurster coater: a bed that circulates through a draft tube."""
+"""A Wurster coater: a bed that circulates through a draft tube and a spray."""
 
-from scenarios.beds.wurster.study import Circulation, circulation
+from scenarios.beds.wurster.study import Circulation, Coating, circulation, coating
 
-__all__ = ["Circulation", "circulation"]
+__all__ = ["Circulation", "Coating", "circulation", "coating"]

@@ -1,10 +1,12 @@
-"""Circulation of a bed through a draft tube: how many pellets rise in it, how fast, and that none passes its wall."""
+"""Circulation of a bed through a draft tube, and the spray on it: how many pellets rise and how fast, that none passes
+the wall of the tube, how many get liquid, and how evenly."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +14,19 @@ import numpy as np
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.case.walls import CaseWall
+from cfddem.features.spray import cone
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import BLUE, ORANGE, legend, panels, save
-from scenarios.beds.vessel_slice import WALL, draw_spheres, draw_vessel
+from scenarios.beds.vessel_slice import CUBIC_MILLIMETRES, WALL, draw_spheres, draw_vessel
 
 INNER = 0.25
 """Part of the tube at each end that is left out [-]."""
+
+PARTS = 20
+"""Parts of the time between snapshots at which pellets are looked for in the spray."""
+
+MOST = 0.05
+"""Liquid on a pellet at the end of the colours [mm3]."""
 
 
 @dataclass(frozen=True)
@@ -64,37 +73,102 @@ def circulation(run: RunData, case: Case) -> Circulation:
     return Circulation(np.array(run.times), rising, falling, velocity, top, crossings)
 
 
+@dataclass(frozen=True)
+class Coating:
+    """Pellets in the spray while it is on, and the liquid on all pellets at the end."""
+
+    reached: float  # share of the pellets that were in the spray [-]
+    visits: float  # entries into it, over all pellets and the time [1/s]
+    residence: float  # mean time of a visit [s]
+    missed: float  # share of the drops that found no pellet [-]
+    liquid: np.ndarray  # of each pellet, its part of bridges included, the driest first [m3]
+
+    @property
+    def wet(self) -> float:
+        """Share of the pellets that carry liquid at the end [-]."""
+        return float((self.liquid > 0.0).mean())
+
+    @property
+    def variation(self) -> float:
+        """Standard deviation of the liquid on a pellet over its mean, dry ones included [-]."""
+        return float(self.liquid.std() / self.liquid.mean())
+
+    @property
+    def half_on(self) -> float:
+        """Share of the pellets, those with the most liquid, that carry half of it [-]."""
+        carried = np.cumsum(self.liquid[::-1])
+        return float((np.searchsorted(carried, 0.5 * carried[-1]) + 1) / len(carried))
+
+
+def coating(run: RunData, case: Case) -> Coating:
+    """The spray on a bed, from its begin to the end of the run.
+
+    Pellets move along straight lines between snapshots. The time of a visit is that of all pellets in the spray over
+    the number of entries.
+    """
+    spray = case.spray
+    assert spray
+    zone = cone(np.array(spray.nozzle), spray.axis, np.radians(spray.angle), spray.length or 0.0)
+    chosen = [n for n, time in enumerate(run.times) if time > spray.begin - 1e-9]
+    places = []
+    for n in chosen:
+        particles = run.particles(n)
+        places.append(particles["position"][np.argsort(particles["id"])].astype(float))
+    between = (np.arange(PARTS) + 1.0) / PARTS
+    inside = np.array([zone(places[0])] + [zone(a + part * (b - a)) for a, b in pairwise(places) for part in between])
+    entries, span = int((inside[1:] & ~inside[:-1]).sum()), float(run.times[chosen[-1]] - run.times[chosen[0]])
+    sprayed, missed = (float(run.history[name][-1]) for name in ("liquid_sprayed", "liquid_missed"))
+    return Coating(
+        reached=float(inside.any(axis=0).mean()),
+        visits=entries / inside.shape[1] / span,
+        residence=float(inside[1:].mean(axis=0).sum()) * span / entries,
+        missed=missed / (sprayed + missed),
+        liquid=np.sort(run.particles(-1)["liquid_carried"]),
+    )
+
+
 # ---------------------------------------------------------------- figure of the coater
 
 
 def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None:
-    """Pellets near the middle plane at some times, the mean velocity of the air, and the circulation."""
-    drawn, axes = panels(len(times) + 2, width=11.0, height=4.0, width_ratios=[*[1.0] * (len(times) + 1), 1.5])
+    """Pellets near the middle plane at some times, coloured by their liquid, the mean velocity of the air, the
+    circulation, and how many pellets carry how much."""
+    ratios = [*[1.0] * (len(times) + 1), 1.6, 1.6]
+    drawn, axes = panels(len(times) + 3, width=11.0, height=3.4, width_ratios=ratios)
     for axis, time in zip(axes, times):
-        shown = draw_spheres(axis, run, case, time, reach=0.75, size=11.0, fastest=1.5)
+        shown, balls = draw_spheres(axis, run, case, time, reach=0.75, size=9.0, most=MOST, by="liquid")
         axis.set_title(f"{shown:.2f} s", fontsize=9.5)
+    bar = drawn.colorbar(balls, ax=axes[len(times) - 1], shrink=0.7, pad=0.04, extend="max")
+    bar.ax.set_title("mm3", fontsize=9.5)
     late = [n for n, time in enumerate(run.times) if time > 0.5 * run.times[-1]]
     velocity = np.mean([run.fluid("velocity", n)[..., 2] for n in late], axis=0)
     rows = slice(velocity.shape[1] // 2 - 1, velocity.shape[1] // 2 + 1)
-    seen = axes[-2].imshow(
+    seen = axes[-3].imshow(
         velocity[:, rows].mean(axis=1), origin="lower", cmap="viridis", vmin=0.0,
         extent=(0.0, case.column.width, 0.0, case.column.height),
     )  # fmt: skip
-    drawn.colorbar(seen, ax=axes[-2], shrink=0.7, pad=0.04)
-    axes[-2].set_title("air, upward  [m/s]", fontsize=9.5)
+    drawn.colorbar(seen, ax=axes[-3], shrink=0.7, pad=0.04)
+    axes[-3].set_title("air, upward  [m/s]", fontsize=9.5)
     tube = tube_of(case)
     ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
-    for axis in axes[:-1]:
+    for axis in axes[:-2]:
         draw_vessel(axis, case, case.column.height)
         for side in (-1.0, 1.0):
             axis.plot(2 * [tube.point[0] + side * (tube.radius or 0.0)], ends, color=WALL, lw=1.6)
-    found, curve = circulation(run, case), axes[-1]
-    curve.plot(found.time, found.rising, color=BLUE, label="rise in the tube  [1/s]")
-    curve.plot(found.time, found.falling, color=ORANGE, label="fall around it  [1/s]")
-    curve.set(xlabel="time  [s]", ylim=(0.0, 1.3 * float(np.nanmax(found.rising))))
+    for axis in axes[1:-2]:
+        axis.set(ylabel="", yticklabels=[])
+    found, curve = circulation(run, case), axes[-2]
+    curve.plot(found.time, found.rising / 1e3, color=BLUE, label="rise in the tube")
+    curve.plot(found.time, found.falling / 1e3, color=ORANGE, label="fall around it")
+    curve.set(xlabel="time  [s]", ylim=(0.0, 1.4e-3 * float(np.nanmax(found.rising))))
+    curve.set_title("pellets in a second, thousands", fontsize=9.5)
     legend(curve, loc="upper right")
+    carried = coating(run, case).liquid * CUBIC_MILLIMETRES
+    axes[-1].hist(carried[carried > 0.0], bins=np.linspace(0.0, 2.0 * MOST, 25), color=BLUE)
+    axes[-1].set(xlabel="liquid on a pellet  [mm3]", yscale="log")
+    axes[-1].set_title("wet pellets, at the end", fontsize=9.5)
     save(drawn, path)
 
 
 if __name__ == "__main__":
-    figure(open_run(sys.argv[1]), gallery()["wurster"], (0.1, 0.2, 0.4), Path(sys.argv[2]))
+    figure(open_run(sys.argv[1]), gallery()["wurster"], (0.3, 0.6), Path(sys.argv[2]))
