@@ -92,6 +92,9 @@ def find_issues(
         found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
         found += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
         found += check_expansion(case, bed)
+    elif case.bed.fastest_inflow > 0.0:
+        said = "unused, because the case has no table [fluid]"
+        found.append(Issue("warning", "bed.inlet_velocity", said, "add that table, or leave the velocity out"))
     found.sort(key=lambda each: ORDER.index(each.severity))
     return [*check_length(case, refused=any(each.severity == "error" for each in found)), *found]
 
