@@ -37,7 +37,8 @@ def _collide(
     numbers = None if stokes is None else stokes_numbers(stokes)
     for name in (material, target):
         if name is not None and name not in known:
-            raise InputError("material", name, nearest(name, known))
+            remedy = "for another solid, call collide(Material(...), ...) in Python, as in the README"
+            raise InputError("material", name, nearest(name, known), remedy)
     pair = known[material], known[target or material]
     if roughness is not None:
         rough = [Material(**each.model_dump() | {"roughness": roughness}) for each in pair]
