@@ -13,10 +13,10 @@ from typing import Any
 
 from cfddem.analysis.key_results import AGREES
 from cfddem.analysis.report import case_of, report
-from cfddem.analysis.report_text import WIDTH, Report, number, spelled
+from cfddem.analysis.report_text import Report, number, spelled
 from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import InputError
-from cfddem.backend.tables import table
+from cfddem.backend.tables import line_width, table
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 
@@ -221,7 +221,7 @@ def _runs(result: dict[str, Any]) -> Iterator[str]:
     for name, row in result["key_results"].items():
         if any(key_result is not None and isinstance(key_result.value, str) for key_result in row):
             words = "; ".join(str(key_result.value) if key_result else "-" for key_result in row)
-            yield from textwrap.wrap(f"{name:<10} {words}", WIDTH, subsequent_indent=" " * 11)
+            yield from textwrap.wrap(f"{name:<10} {words}", line_width() - 2, subsequent_indent=" " * 11)
 
 
 def _changes(keys: dict[str, list[Any]]) -> Iterator[str]:
@@ -229,7 +229,7 @@ def _changes(keys: dict[str, list[Any]]) -> Iterator[str]:
     yield "keys of the cases that differ" if keys else "the cases are the same"
     for key, values in keys.items():
         text = "  ".join("-" if value is None else f"{value}"[:40] for value in values)
-        yield from textwrap.wrap(f"  {key:<28} {text}", WIDTH, subsequent_indent=" " * 31)
+        yield from textwrap.wrap(f"  {key:<28} {text}", line_width() - 2, subsequent_indent=" " * 31)
 
 
 def _means(result: dict[str, Any]) -> Iterator[str]:

@@ -190,7 +190,7 @@ def _shallow(case: Case, measures: Mapping[str, Measure]) -> str:
         return ""
     bed, count = _bed_at_end(case, measures["bed_height"]), cell_counts(case.column.size, case.column.cell)[2]
     cells = measures["bed_height"].mean / case.column.height * count
-    packed = bed.inlet <= bed.onset and FROM_HEIGHT in measures and measures[FROM_HEIGHT].mean < LOOSE
+    packed = 0.0 < bed.inlet <= bed.onset and FROM_HEIGHT in measures and measures[FROM_HEIGHT].mean < LOOSE
     if cells >= SHALLOW or not (case.bed.fixed or packed):
         return ""
     return (

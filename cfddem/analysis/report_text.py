@@ -13,11 +13,8 @@ from cfddem.analysis.bed_laws import FROM_PRESSURE
 from cfddem.analysis.report_values import Citation, EnergyLine, KeyResult, LawComparison, Measure
 from cfddem.analysis.run_warnings import NOTE
 from cfddem.backend import html
-from cfddem.backend.tables import table
+from cfddem.backend.tables import line_width, table
 from cfddem.io.quantities import shown_unit
-
-WIDTH = 98
-"""Columns of wrapped lines."""
 
 REMARKS = {FROM_PRESSURE: "; middle of the bed"}
 """What a reader should know about a mean, by its name."""
@@ -201,7 +198,9 @@ def bounds_note(result: Report) -> list[str]:
 def _headline(result: Report) -> Iterator[str]:
     reason = f", {result.message}" if result.status == "finished" and result.message else ""
     yield f"{result.case}: {result.status}{reason}"
-    yield from textwrap.wrap(window(result), WIDTH, subsequent_indent="  ")
+    parts = window(result).replace(" ", NO_BREAK).replace(f";{NO_BREAK}", "; ")  # a line ends between two parts
+    for line in textwrap.wrap(parts, line_width() - 2, subsequent_indent="  "):
+        yield line.replace(NO_BREAK, " ")
     yield from bounds_note(result)
 
 
@@ -212,7 +211,8 @@ def _key_results(results: Sequence[KeyResult]) -> Iterator[str]:
         if isinstance(key_result.value, str) and len(opening) > wide + 20:
             yield opening.rstrip()
             opening = " " * (wide + 20)
-        yield from textwrap.wrap(opening + key_result.verdict, WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
+        wrapped = textwrap.wrap(opening + key_result.verdict, line_width() - 2, subsequent_indent=" " * (wide + 20))
+        yield from wrapped or [opening]
 
 
 def _measured(comparisons: list[dict[str, Any]]) -> Iterator[str]:
@@ -222,14 +222,14 @@ def _measured(comparisons: list[dict[str, Any]]) -> Iterator[str]:
         points, outside = comparison["points"], comparison["outside"]
         part = f"{points} of {points + outside} points" if outside else f"{points} point{'' if points == 1 else 's'}"
         opening = f"  {comparison['name']:<16} {part} of {spelled(comparison['quantity'])}: "
-        yield from textwrap.wrap(opening + comparison["verdict"], WIDTH, subsequent_indent=" " * 19)
+        yield from textwrap.wrap(opening + comparison["verdict"], line_width() - 2, subsequent_indent=" " * 19)
 
 
 def _laws(result: Report) -> Iterator[str]:
     if result.laws:
         headings = ("law", "run", "law", "ratio", "unit")
         yield from table(law_cells(result), headings, right=(1, 2, 3), widths=(40, 10, 10, 7), indent=2)
-        yield from textwrap.wrap(result.laws_note, WIDTH, initial_indent="  ", subsequent_indent="    ")
+        yield from textwrap.wrap(result.laws_note, line_width() - 2, initial_indent="  ", subsequent_indent="    ")
 
 
 def _collisions(result: Report) -> Iterator[str]:
@@ -263,7 +263,7 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
         return []
     parts = sorted(seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1])
     shares = ", ".join(f"{name} {100 * part_seconds / total:.0f}{NO_BREAK}%" for name, part_seconds in parts[:6])
-    lines = textwrap.wrap(f"  wall time {total:.3g} s: {shares}", WIDTH, subsequent_indent="    ")
+    lines = textwrap.wrap(f"  wall time {total:.3g} s: {shares}", line_width() - 2, subsequent_indent="    ")
     return [line.replace(NO_BREAK, " ") for line in lines]
 
 
@@ -271,7 +271,7 @@ def _action(action: str, reasons: Sequence[str]) -> Iterator[str]:
     yield f"  {action}"
     opening = "" if action == NOTE else "warning: "
     for reason in reasons:
-        yield from textwrap.wrap(f"{opening}{reason}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+        yield from textwrap.wrap(f"{opening}{reason}", line_width() - 2, initial_indent="  ", subsequent_indent="    ")
 
 
 # ---------------------------------------------------------------- Markdown

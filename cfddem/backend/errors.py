@@ -13,6 +13,9 @@ MANY = 10
 """Largest number of known words that a message lists if one of them is similar."""
 
 
+ALIKE = 0.61
+"""Least likeness of a word to a known one that is named as the one that was meant, of difflib; 1 for the same word."""
+
 LONGEST = 60
 """Longest value or key that is shown [characters]."""
 
@@ -75,7 +78,7 @@ def nearest(word: str, allowed: Iterable[str]) -> str:
     "one of di_felice, gidaspow (did you mean 'di_felice'?)"
     """
     words = list(allowed)
-    close = get_close_matches(word, words, n=3) or get_close_matches(_plain_name(word), words, n=3)
+    close = get_close_matches(word, words, 3, ALIKE) or get_close_matches(_plain_name(word), words, 3, ALIKE)
     shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
     more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""
     return f"one of {', '.join(shown)}{more}" + (f" (did you mean {close[0]!r}?)" if close else "")

@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 import io
+import shutil
+import sys
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,16 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 """Widest line [characters]."""
+
+NARROWEST = 72
+"""Lines are not made narrower than this on a narrow terminal [characters]."""
+
+
+def line_width() -> int:
+    """Width of a printed line: that of the terminal, within limits; WIDTH where output goes elsewhere [characters]."""
+    if sys.stdout is None or not sys.stdout.isatty():
+        return WIDTH
+    return max(NARROWEST, min(WIDTH, shutil.get_terminal_size().columns))
 
 
 def table(
@@ -36,10 +48,11 @@ def table(
     """
     from rich.console import Console
 
-    columns = grid(rows, headings, right=right, widths=widths, gap=gap)
+    wide = line_width()
+    columns = grid(rows, headings, right=right, widths=widths if wide == WIDTH else (), gap=gap)
     if not columns.columns:
         return []
-    page = Console(file=io.StringIO(), width=WIDTH - indent, color_system=None, legacy_windows=False, record=False)
+    page = Console(file=io.StringIO(), width=wide - indent, color_system=None, legacy_windows=False, record=False)
     page.print(columns)
     return [f"{' ' * indent}{line}".rstrip() for line in page.file.getvalue().splitlines()]  # type: ignore[attr-defined]
 

@@ -159,6 +159,9 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
     named = next((str(part) for part in reversed(key[-2:]) if part in owner.model_fields), last)  # or values by name
     about = owner.model_fields[named].description if named in owner.model_fields else None
     value = None if limits.keys() == {"given"} else shown(first["input"])
+    if value is None and len(key) == 1 and sections_of(owner.model_fields[named]):
+        remedy = f"a table {_header(named, owner.model_fields[named])}; cfddem explain {named} lists its keys"
+        return InputError(field, None, "given", remedy)
     return InputError(field, value, " or ".join(limits) or first["msg"], f"{named}: {about}" if about else "")
 
 
@@ -228,6 +231,11 @@ def _right_table(word: str, owner: type[BaseModel], model: type[BaseModel]) -> s
         for part in sections_of(field):
             if part is not owner and word in part.model_fields:
                 return f"{word} belongs to {name}"
+    if owner is model:
+        fields, stem = model.model_fields.items(), word.rstrip("s")
+        keys = [f"{name}.{key}" for name, field in fields for part in sections_of(field) for key in part.model_fields]
+        alike = [key for key in keys if stem in key.partition(".")[2].split("_")]
+        return f"keys with this word: {', '.join(alike[:3])}" if alike else "cfddem new --schema shows all tables"
     return f"cfddem explain {table} lists them" if (table := next(iter(_tables(owner, model)), "")) else ""
 
 

@@ -31,7 +31,8 @@ class Checked(BaseModel):
     def _no_bool_as_number(cls, value: Any, about: ValidationInfo) -> Any:
         field = cls.model_fields[about.field_name or ""]
         if isinstance(value, bool) and field.annotation is not bool:
-            raise InputError(about.field_name or "", value, "something other than true or false")
+            remedy = f"{about.field_name}: {field.description}" if field.description else ""
+            raise InputError(about.field_name or "", value, "something other than true or false", remedy)
         return value
 
     def __init__(self, **values: Any) -> None:

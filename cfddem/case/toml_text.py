@@ -56,7 +56,7 @@ def parse(text: str, name: str) -> dict[str, Any]:
         line = int(position[1]) if position else text.rstrip().count("\n") + 1
         if reason.startswith("Cannot overwrite a value") or reason.endswith(" twice"):
             raise _given_twice(text, line, name) from None
-        comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+)\s*(#.*)?", text.split("\n")[line - 1])
+        comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+(?:[eE][-+]?\d+)?)\s*(#.*)?", text.split("\n")[line - 1])
         remedy = f"; decimals have a point: {comma[1]}.{comma[2]}" if comma else ""
         unit = re.fullmatch(r"[^=#]*=\s*([-+]?[.\d]+(?:e[-+]?\d+)?)\s*[A-Za-z%µ°][^=]*", text.split("\n")[line - 1])
         remedy += f"; numbers stand without a unit, in SI units: {unit[1]}" if unit else ""

@@ -35,7 +35,7 @@ DIVISION = "ranks along x, y and z, such as 2x2x1; default: the shape with the l
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
-LAWS = "Python file with laws of your own, which is executed; nothing in a case or a run folder ever is"
+LAWS = "Python file with your laws, which is executed; nothing in a case or run folder ever is; may be repeated"
 
 
 @Parameter(name="*")
@@ -58,15 +58,15 @@ class Changes:
     """What a command adds to a case file; its fields are options."""
 
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None
-    laws: Annotated[Path | None, Parameter(help=LAWS)] = None
+    laws: Annotated[list[Path] | None, Parameter(help=LAWS, negative="")] = None
 
     def case(self, path: Path) -> Case:
         """The case of a file with its values replaced, after the user's laws are known."""
         from cfddem.case.gallery import overrides
         from cfddem.case.schema import Case
 
-        if self.laws:
-            import_laws(self.laws)
+        for file in self.laws or []:
+            import_laws(file)
         return Case.from_toml(path, overrides(self.set or []))
 
 
@@ -289,7 +289,7 @@ def resume(
     folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
     *,
     until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
-    laws: Annotated[Path | None, Parameter(help=LAWS)] = None,
+    laws: Annotated[list[Path] | None, Parameter(help=LAWS, negative="")] = None,
     set: Annotated[list[str] | None, Parameter(show=False, negative="")] = None,
     processors: Processors = WHOLE_MACHINE,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
@@ -310,11 +310,11 @@ def resume(
 
     folder = folder or newest_run(Path())
     if set:
-        remedy = f"a changed case is a new run: cfddem run {folder}/case.toml --set {set[0]} -o NEW"
+        remedy = f"to go on with another value: cfddem run --from {folder} --set {set[0]} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
     communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
-    if laws is not None:
-        import_laws(laws)
+    for file in laws or []:
+        import_laws(file)
     if until is None and (before := open_run(folder)).status == "finished":
         if communicator.rank == 0 and json:
             _print_report(folder, json)

@@ -37,7 +37,8 @@ def _collide(
     numbers = None if stokes is None else stokes_numbers(stokes)
     for name in (material, target):
         if name is not None and name not in materials:
-            raise InputError("material", name, nearest(name, materials))
+            remedy = "for another solid, call collide(Material(...), ...) in Python, as in the README"
+            raise InputError("material", name, nearest(name, materials), remedy)
     pair = materials[material], materials[target or material]
     if roughness is not None:
         rough = [Material(**material_of_sphere.model_dump() | {"roughness": roughness}) for material_of_sphere in pair]

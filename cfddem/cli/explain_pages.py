@@ -20,6 +20,7 @@ from pylatexenc.latexwalker import get_default_latex_context_db as arguments_of_
 from pylatexenc.macrospec import MacroSpec
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.tables import line_width
 from cfddem.case.absent import TABLES, absent
 from cfddem.case.input_errors import sections_of
 from cfddem.case.schema import Case
@@ -27,9 +28,6 @@ from cfddem.cli.scenario_commands import descriptions
 from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
 from closures import registry
 from closures.registry import Law
-
-WIDTH = 100
-"""Columns of printed text."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
@@ -138,15 +136,15 @@ def page(law: Law) -> list[str]:
         elif re.match(r"\w+(, \w+)*  +\S", paragraph):
             for line in plain_words(paragraph).split("\n"):
                 indent = len(line) - len(re.sub(r"^(\w+(, \w+)*)?  +", "", line))
-                out += textwrap.wrap(line, WIDTH, subsequent_indent=" " * indent, drop_whitespace=True) or [""]
+                out += textwrap.wrap(line, line_width(), subsequent_indent=" " * indent, drop_whitespace=True) or [""]
         else:
-            out += textwrap.wrap(" ".join(plain_words(paragraph).split()), WIDTH)
+            out += textwrap.wrap(" ".join(plain_words(paragraph).split()), line_width())
         out.append("")
     if law.kind == CONTACT_LAW:
         out += _contact_lines(contact_named(law.name))
     for name, (low, high) in law.ranges.items():
         out.append(f"range of {name}: {low:g} to {high:g}")
-    out += textwrap.wrap(f"reference: {law.reference}", WIDTH, subsequent_indent="  ")
+    out += textwrap.wrap(f"reference: {law.reference}", line_width(), subsequent_indent="  ")
     return out
 
 
@@ -157,7 +155,7 @@ def _contact_lines(law: ContactLaw) -> list[str]:
     lines = [f"in a case: [laws] contact = {law.name!r}".replace("'", '"')]
     lines += [f"parameters, in [laws.contact_parameters]: {parameters}"] * bool(parameters)
     lines += [f"memory of a pair: {memory}"] * bool(memory)
-    return [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
+    return [part for line in lines for part in textwrap.wrap(line, line_width(), subsequent_indent="  ")]
 
 
 def _equation_lines(equation: str) -> list[str]:
@@ -165,7 +163,7 @@ def _equation_lines(equation: str) -> list[str]:
     out = []
     for part in re.split(r"\\q?quad|\\\\", equation):
         text = _solid_brackets(equation_text(part.strip()))
-        out += textwrap.wrap(text, WIDTH - 4, initial_indent="    ", subsequent_indent="        ")
+        out += textwrap.wrap(text, line_width() - 4, initial_indent="    ", subsequent_indent="        ")
     return [line.replace(NO_BREAK, " ") for line in out]
 
 
@@ -185,11 +183,11 @@ def listing(laws_by_kind: Mapping[str, Mapping[str, Law]]) -> list[str]:
         out += ["", kind.replace("_", " ")]
         for law in those.values():
             sentence = plain_words(summary(law)["sentence"])
-            out.append(textwrap.shorten(f"{law.name:.<36} {sentence}", WIDTH - 2, placeholder=" ..."))
+            out.append(textwrap.shorten(f"{law.name:.<36} {sentence}", line_width() - 2, placeholder=" ..."))
             out[-1] = "  " + re.sub(r"\.{2,}(?= )", lambda dots: " " * len(dots[0]), out[-1], count=1)
             if law.ranges:
                 out += textwrap.wrap(
-                    f"for {law.range_in_words}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
+                    f"for {law.range_in_words}", line_width(), initial_indent=" " * 39, subsequent_indent=" " * 43
                 )
     return out[1:]
 
@@ -342,7 +340,7 @@ SEVERAL |= {name: f"{name}.NUMBER" for name in ("wall", "feed", "outlet")}
 
 
 def matching(name: str) -> dict[str, FieldInfo]:
-    """A key, all keys of a table, or all keys that contain a word; empty if nothing matches.
+    """A key, all keys of a table, those that contain a word, or those with it as a choice; empty if nothing matches.
 
     >>> key_lines(matching("bed.jet.velocity")), key_lines(matching("run.until"))[0][:34]
     (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
@@ -353,13 +351,14 @@ def matching(name: str) -> dict[str, FieldInfo]:
         key for key in every if any(name == word or name.startswith(f"{word}.") for name in (key.lower(), plain[key]))
     ]
     keys = keys or [key for key in every if word in key.lower()]
+    keys = keys or [key for key, field in every.items() if word in key_summary(key, field)["choices"]]
     return {key: every[key] for key in keys}
 
 
 def not_there(name: str) -> list[str]:
     """What the table of a name does not have, in lines of at most 100 columns; empty for other names."""
     words = TABLES.get(name.lower(), "")
-    return ["", *textwrap.wrap(f"{words} The page Limits has more.", WIDTH)] if words else []
+    return ["", *textwrap.wrap(f"{words} The page Limits has more.", line_width())] if words else []
 
 
 def every_key() -> list[str]:
@@ -388,7 +387,7 @@ def key_lines(keys: Mapping[str, FieldInfo]) -> list[str]:
         default, choices = _default(field), _choices(field)
         shown = " = (required)" if field.is_required() else "" if default is None else f" = {json.dumps(default)}"
         meaning = (field.description or "") + (f"; one of {choices[0]}" if choices else "")
-        out += textwrap.wrap(f"{key + shown:<33} {meaning}", WIDTH, subsequent_indent=" " * 34)
+        out += textwrap.wrap(f"{key + shown:<33} {meaning}", line_width(), subsequent_indent=" " * 34)
     return out
 
 

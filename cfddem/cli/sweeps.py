@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.tables import line_width
 from cfddem.cli.cases import CASE, JSON, SET, print_warnings
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
-from cfddem.preflight.issue import WIDTH
 
 if TYPE_CHECKING:
     from cfddem.studies.calibration import Calibration, Trial
@@ -236,7 +236,7 @@ def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
         out.append("too few finished trials for an estimate; repeat the command with more --trials")
     if result["best"] is not None:
         chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
-        out += ["", *textwrap.wrap(result["verdict"], WIDTH)]
+        out += ["", *textwrap.wrap(result["verdict"], line_width())]
         out += [f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]
     out += [f"{result['trials']} trials, {result['failed']} failed; table and figure in {folder}"]
     return out

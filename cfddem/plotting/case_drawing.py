@@ -57,7 +57,7 @@ def case_drawing(case: Case, bed_height: float | None = None) -> Figure:
     _inflow(axes, case)
     _patches(axes, case)
     if bed_height is not None and math.isfinite(bed_height):
-        axes.axhline(bed_height, color=ORANGE, linewidth=1.6, linestyle="--")
+        axes.hlines(bed_height, 0.0, width, color=ORANGE, linewidth=1.6, linestyle="--")
         axes.text(1.05 * width, bed_height, "bed height", color=ORANGE, fontsize=9.5, va="center", clip_on=False)
     margin = 0.04 * max(width, height)
     low = -0.16 * height if case.fastest_inflow > 0.0 and case.column.ends == "flow" else -margin

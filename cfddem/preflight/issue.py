@@ -7,8 +7,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import Literal
 
-WIDTH = 100
-"""Columns of printed text."""
+from cfddem.backend.tables import line_width
 
 Severity = Literal["note", "warning", "error"]
 """An error stops the run, a warning says what to change, a note needs no action."""
@@ -29,7 +28,7 @@ class Issue:
 
     def lines(self, opening: str = "") -> list[str]:
         """The issue as text, at most 100 columns wide."""
-        return textwrap.wrap(f"{opening}{self.severity}: {self}", WIDTH, subsequent_indent="  ")
+        return textwrap.wrap(f"{opening}{self.severity}: {self}", line_width(), subsequent_indent="  ")
 
     def __str__(self) -> str:
         return f"{self.key}: {self.reason}; {self.remedy}"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.tables import line_width
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
@@ -18,7 +20,6 @@ from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.accuracy import accuracy
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
-from cfddem.preflight.issue import WIDTH
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate
 from cfddem.preflight.wall_checks import area_by_cells, closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
@@ -39,10 +40,10 @@ class Row:
     unit: str = ""
     note: str = ""
 
-    def line(self) -> str:
-        """The number as a line of text, at most 100 columns wide."""
-        text = f"  {self.name:<34} {_number(self.value):>10} {self.unit:<5} {self.note}".rstrip()
-        return text if len(text) <= WIDTH else f"{text[: WIDTH - 4]} ..."
+    def lines(self) -> list[str]:
+        """The number as text, at most 100 columns wide; a long note goes on below."""
+        opening = f"  {self.name:<34} {_number(self.value):>10} {self.unit:<5} "
+        return textwrap.wrap(opening + self.note, line_width(), subsequent_indent=" " * len(opening))
 
 
 def overview(
@@ -75,7 +76,9 @@ def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
         return
     cell = case.column.cell if isinstance(case.column.cell, float) else min(case.column.cell)
     several = bool(case.bed.species)
-    yield Row(group, "cell / diameter", cell / case.bed.largest_diameter, "", "of the largest species" * several)
+    largest, mean = case.bed.largest_diameter, case.bed.diameter
+    note = f"of the largest spheres; {cell / mean:.3g} by the Sauter mean" if largest > 1.001 * mean else ""
+    yield Row(group, "cell / diameter", cell / largest, "", "of the largest species" if several else note)
     yield Row(group, "density ratio", case.solid_density / case.around.density, "", "solid over fluid")
     if math.isnan(bed.archimedes):
         return

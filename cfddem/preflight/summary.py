@@ -17,6 +17,7 @@ import numpy as np
 
 from cfddem.backend import html
 from cfddem.backend.errors import CfddemError, InputError
+from cfddem.backend.tables import line_width
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -24,7 +25,7 @@ from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
 from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import fits
-from cfddem.preflight.issue import ORDER, WIDTH, Issue
+from cfddem.preflight.issue import ORDER, Issue
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
@@ -81,12 +82,12 @@ class Preflight:
 
     def lines(self) -> list[str]:
         """The whole result as text, at most 100 columns wide."""
-        out, group = [textwrap.shorten(self.title, WIDTH, placeholder=" ...")], ""
+        out, group = [textwrap.shorten(self.title, line_width(), placeholder=" ...")], ""
         for row in self.rows:
             if row.group != group:
                 group = row.group
                 out += ["", group.capitalize()]
-            out.append(row.line())
+            out += row.lines()
         return [*out, "", *self.issue_lines()]
 
     def _repr_html_(self) -> str:

@@ -99,6 +99,16 @@ def test_the_pressure_drop_of_a_shallow_packed_bed_says_that_it_is_too_low(tmp_p
         assert ("too low, as the bed is only 4 cells high" in drop.verdict) == said
 
 
+@pytest.mark.parametrize(("velocity", "said"), [(0.01, True), (0.0, False)])
+def test_a_shallow_bed_without_flow_has_no_pressure_drop_that_is_too_low(
+    tmp_path: Path, velocity: float, said: bool
+) -> None:
+    text = BED.replace("inlet_velocity = 0.05", f"inlet_velocity = {velocity}").replace("cell = 0.005", "cell = 0.01")
+    folder = made_up(tmp_path / "run", text.replace("[laws]", '[laws]\nsurface = "smeared"'), bed_voidage=0.42)
+    (drop,) = (each for each in report(folder).key_results if each.name == "pressure drop")
+    assert ("too low, as the bed is only 4 cells high" in drop.verdict) == said
+
+
 def test_warnings_of_the_check_are_repeated_where_they_affect_the_answers(tmp_path: Path) -> None:
     soft = BED.replace("contact_modulus = 1e7", "contact_modulus = 8e4").replace("[run]", "[run]\nevery = 1e-5")
     said = report(made_up(tmp_path / "run", soft)).actions["check the case: before the run, it had these warnings"]
@@ -290,3 +300,8 @@ def test_voidage_from_the_pressure_gradient() -> None:
         found = voidage_from_pressure(pressure.reshape(-1, 1, 1), (1.0, 1.0, spacing), 1e4, 0.012, 0.048)
         assert found == pytest.approx(0.55, abs=1e-12)
     assert math.isnan(voidage_from_pressure(np.zeros((4, 1, 1)), (1.0, 1.0, 0.025), 1e4, 0.012, 0.048))
+
+
+def test_the_head_of_a_report_breaks_between_its_parts(tmp_path: Path) -> None:
+    head = lines(report(made_up(tmp_path / "run")))[1:3]
+    assert head[0].endswith(";") and head[1] == "  surface of the bed: sharp, the default in a liquid"

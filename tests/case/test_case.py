@@ -94,7 +94,10 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ({"bed.diameter.mean": 1e-3}, "must be inside a table; diameter is a value"),
         ({"laws.gravity": 9.81}, "laws.gravity = 9.81: must be a list"),
         ({"run": 3.0}, "run = 3.0: must be a table"),
-        ({"bed.seed": True}, "bed.seed = True: must be something other than true or false"),
+        ({"bed.seed": True}, "bed.seed = True: must be something other than true or false; seed: random seed"),
+        ({"run": None}, "run: must be given; a table [run]; cfddem explain run lists its keys"),
+        ({"inlet": {"velocity": 1.0}}, "evaporation; keys with this word: bed.inlet_velocity, "),
+        ({"solver": {"name": "x"}}, "evaporation; cfddem new --schema shows all tables"),
         ({"title": "two\nlines"}, "title = 'two\\nlines': must be one line"),
     ],
     ids=str,
@@ -114,6 +117,7 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
         (b"[a]\nb = 1\n[a]\nc = 3", ":3: a: must be given once; line 1 gives it, too"),
         (b"a = 1\nuntil = 1,7\n", ":2: must be valid TOML; Expected newline or end of document after a statement in"),
         (b"until = 1,7 # s\n", "; decimals have a point: 1.7"),
+        (b"viscosity = 1,0e-3 # Pa s\n", "; decimals have a point: 1.0e-3"),
         (b"until = 1.7 s\n", "; numbers stand without a unit, in SI units: 1.7"),
         (b"start = expanded\n", "must be valid TOML; Invalid value in column 9; strings need quotation marks"),
         (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each solid"),
@@ -126,7 +130,7 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
         (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
         (b"", "must be given"),
     ],
-    ids=range(14),
+    ids=range(15),
 )
 def test_a_file_that_is_no_case_is_refused_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "bed.toml"

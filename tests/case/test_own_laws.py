@@ -284,7 +284,8 @@ def test_check_and_run_import_a_law_of_the_file_that_the_user_names(
     done = call("check", "bed/case.toml")
     assert done.code == 2 and "laws.drag = 'of_a_file': must be one of" in done.err and "--laws FILE.py" in done.err
     assert file.stem not in sys.modules
-    assert call("check", "bed/case.toml", "--laws", file.name).code == 0
+    (folder.parent / "unused_laws.py").write_text("import closures\n")
+    assert call("check", "bed/case.toml", "--laws", "unused_laws.py", "--laws", file.name).code == 0
     done = call("run", "bed/case.toml", "-o", "again", "--laws", file.name, "--set", "until=0.001")
     assert done.code == 0, done.err
     assert open_run("again").status == "finished" and "of_a_file" in open_run("again").case_text
@@ -308,9 +309,9 @@ def test_a_file_of_laws_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_resume_says_how_a_changed_case_is_run(tmp_path: Path) -> None:
-    """`cfddem resume FOLDER --set ...`: one line with the command, whose case file exists."""
+    """`cfddem resume FOLDER --set ...`: one line with the command that begins a new run at its end."""
     folder = made_up(tmp_path / "run")
     done = call("resume", str(folder), "--set", "fluid.viscosity=2e-3")
     assert done.code == 2 and len(done.err.splitlines()) == 1
-    assert f"cfddem run {folder}/case.toml --set fluid.viscosity=2e-3 -o NEW" in done.err
-    assert (folder / "case.toml").is_file() and "--set" not in call("resume", "--help").out
+    assert f"cfddem run --from {folder} --set fluid.viscosity=2e-3 -o NEW" in done.err
+    assert "--set" not in call("resume", "--help").out

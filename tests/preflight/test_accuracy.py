@@ -103,7 +103,7 @@ def test_what_was_measured_with_smeared_surfaces_says_so_beside_sharp_ones() -> 
     case = glass(0.037).with_(**{"laws.kernel_width": 2.0})
     noted = [each for each in preflight(case).rows if each.note.endswith("smeared surfaces")]
     assert len(noted) == len(LIQUID) + 1
-    assert all(each.line().endswith("with smeared surfaces") for each in noted)
+    assert all(" ".join(each.lines()).endswith("with smeared surfaces") for each in noted)
 
 
 def numbers_of(page: str, begin: str, end: str) -> list[float]:

@@ -219,6 +219,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"bed.inlet_velocity": 0.03}, "warning", "bed.inlet_velocity", "below minimum fluidisation, 0.0533 m/s"),
         ({"bed.inlet_velocity": 0.4}, "error", "column.height", "the lid is at 0.16 m"),
         ({"column.ends": "closed"}, "warning", "bed.inlet_velocity", "unused"),
+        ({"fluid": None}, "warning", "bed.inlet_velocity", "unused, because the case has no table [fluid]"),
         (
             {"run.particle_step": 1e-3},
             "error",
@@ -299,7 +300,9 @@ def test_wrong_positions_are_reported(positions: list[list[float]], said: str) -
 
 def test_a_dry_case_is_checked() -> None:
     text = TEXT.replace("[fluid] ", "[no]").replace("density = 997.0", "").replace("viscosity = 8.354e-4", "")
-    result = preflight(Case.from_text(text.replace("[no]", "#")))
+    dry = Case.from_text(text.replace("[no]", "#"))
+    assert [each.key for each in preflight(dry).issues] == ["bed.inlet_velocity"]  # nothing flows
+    result = preflight(dry.with_(**{"bed.inlet_velocity": 0.0}))
     assert result.status == "ok", result.issue_lines()
     assert number(result, "bed height") > 0.03
 
