@@ -26,7 +26,7 @@ def in_rows(number: int, pitch: float) -> Array:
     [[0.0, 0.0], [0.01, 0.0], [0.005, 0.0087]]
     """
     reach = math.ceil(math.sqrt(number)) + 1
-    i, j = (each.ravel() for each in np.meshgrid(*2 * [np.arange(-reach, reach + 1)]))
+    i, j = (steps.ravel() for steps in np.meshgrid(*2 * [np.arange(-reach, reach + 1)]))
     x, y = i + 0.5 * j, 0.5 * math.sqrt(3.0) * j
     turn = np.round(np.arctan2(y, x) % (2.0 * math.pi), 6)
     nearest = np.lexsort((turn, i * i + i * j + j * j))[:number]
@@ -40,7 +40,7 @@ def samples(places: Array, diameter: float) -> tuple[Array, Array]:
     diameter  of each [m]
     """
     line = ((np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5) * diameter
-    x, y = (each.ravel() for each in np.meshgrid(line, line))
+    x, y = (offsets.ravel() for offsets in np.meshgrid(line, line))
     within = np.hypot(x, y) <= 0.5 * diameter
     return (places[:, :1] + x[within]).ravel(), (places[:, 1:] + y[within]).ravel()
 
@@ -51,9 +51,9 @@ def refuse_holes(patch: Any) -> None:
     patch  of shape = "holes"
     """
     if not patch.brings or patch.side not in ("floor", "lid"):
-        what, given = ("side", patch.side) if patch.brings else ("shape", "holes")
+        key, value = ("side", patch.side) if patch.brings else ("shape", "holes")
         limit = "floor or lid" if patch.brings else "that of an inlet by velocity or mass_flow"
-        raise InputError(what, given, limit, 'holes are for a distributor plate; take shape = "disc" here')
+        raise InputError(key, value, limit, 'holes are for a distributor plate; take shape = "disc" here')
     if isinstance(patch.holes, int):
         if patch.pitch is None:
             raise InputError("pitch", None, "given for a number of holes", "or list the places [x, y] of holes, in m")
@@ -63,7 +63,7 @@ def refuse_holes(patch: Any) -> None:
             if getattr(patch, name) is not None:
                 raise InputError(name, shown(getattr(patch, name)), "left out where holes are listed by place")
         places, key = np.array(patch.holes, float), "holes"
-        rows = [np.hypot(*(places[n + 1 :] - each).T) for n, each in enumerate(places[:-1])]
+        rows = [np.hypot(*(places[n + 1 :] - place).T) for n, place in enumerate(places[:-1])]
         closest = float(np.concatenate(rows).min()) if rows else math.inf
     if closest < patch.diameter * (1.0 - 1e-9):
         raise InputError(

@@ -19,7 +19,7 @@ OUTLINE = 48
 
 def with_openings(vessel: Surface, column: Any, openings: tuple[CasePatch, ...]) -> Surface:
     """The wall of a vessel with the ducts of its openings."""
-    return Joined((vessel, *(duct(each, column) for each in openings))) if openings else vessel
+    return Joined((vessel, *(duct(opening, column) for opening in openings))) if openings else vessel
 
 
 def duct(opening: CasePatch, column: Any) -> Surface:
@@ -41,7 +41,7 @@ def duct(opening: CasePatch, column: Any) -> Surface:
 
 
 def _plane(point: Any, normal: Any) -> Plane:
-    return Plane(tuple(float(each) for each in point), tuple(float(each) for each in normal))  # type: ignore[arg-type]
+    return Plane(tuple(float(x) for x in point), tuple(float(n) for n in normal))  # type: ignore[arg-type]
 
 
 def outline(opening: CasePatch, middle: tuple[float, float]) -> Array:
@@ -78,7 +78,7 @@ def refuse_openings(case: Any) -> None:
                 f"it reaches from {first} = {left:.4g} to {right:.4g} m, {second} = {low:.4g} to {top:.4g} m; move it, "
                 "or make it smaller",
             )  # fmt: skip
-    openings = [(name, each) for name, each in case.patch.items() if each in case.openings]
+    openings = [(name, patch) for name, patch in case.patch.items() if patch in case.openings]
     for (first_name, one), (name, other) in combinations(openings, 2):
         common = overlap(one, other, middle_of(case, one.side)) if one.side == other.side else 0.0
         if common > ROUND_OFF * max(lengths_of(case, one.side)):

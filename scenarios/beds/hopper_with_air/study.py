@@ -107,11 +107,11 @@ def figure(runs: Sequence[RunData], path: Path) -> None:
     curve = axes[-1]
     for run, axis, colour in zip(runs, axes, COLOURS):
         case = case_of(run)
-        found = discharge(run, case)
+        flow = discharge(run, case)
         draw_spheres(axis, run, case, case.run.until, reach=0.75, size=14.0, most=0.6)
         draw_vessel(axis, case, 0.09)
-        axis.set_title(f"{found.pressure:g} Pa", fontsize=9.5, color=colour)
-        words = f"{found.pressure:g} Pa: {found.rate:.3g} kg/s"
+        axis.set_title(f"{flow.pressure:g} Pa", fontsize=9.5, color=colour)
+        words = f"{flow.pressure:g} Pa: {flow.rate:.3g} kg/s"
         curve.plot(run.history["time"], 1e3 * run.history["removed_mass"], color=colour, label=words)
     law, ends = beverloo(case_of(runs[0])), np.array([0.0, case_of(runs[0]).run.until])
     curve.plot(ends, 1e3 * law * ends, color=GREY, ls="--", label=f"Beverloo: {law:.3g} kg/s")
@@ -121,12 +121,12 @@ def figure(runs: Sequence[RunData], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    every = [open_run(folder) for folder in sys.argv[2:]]
-    results = [discharge(each, case_of(each)) for each in every]
-    for each in results:
-        print(each.line())
-    for still in (each for each in results if each.pressure == 0.0):
-        for each in (each for each in results if each is not still):
-            print("{:g} Pa over 0 Pa: {:.3f} +- {:.3f}".format(each.pressure, *each.over(still)))
-    print(f"without air, by Beverloo: {beverloo(case_of(every[0])):.4g} kg/s")
-    figure(every, Path(sys.argv[1]))
+    hoppers = [open_run(folder) for folder in sys.argv[2:]]
+    flows = [discharge(hopper, case_of(hopper)) for hopper in hoppers]
+    for flow in flows:
+        print(flow.line())
+    for still in (flow for flow in flows if flow.pressure == 0.0):
+        for driven in (flow for flow in flows if flow is not still):
+            print("{:g} Pa over 0 Pa: {:.3f} +- {:.3f}".format(driven.pressure, *driven.over(still)))
+    print(f"without air, by Beverloo: {beverloo(case_of(hoppers[0])):.4g} kg/s")
+    figure(hoppers, Path(sys.argv[1]))

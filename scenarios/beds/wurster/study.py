@@ -63,7 +63,7 @@ def circulation(run: RunData, case: Case) -> Circulation:
         level, within = (z > low) & (z < high), np.hypot(x - tube.point[0], y - tube.point[1]) < radius
         up = particles["velocity"][:, 2]
         mean = float(up[level & within].mean()) if (level & within).any() else np.nan
-        rise, fall = (float(up[level & each].sum()) / (high - low) for each in (within, ~within))
+        rise, fall = (float(up[level & region].sum()) / (high - low) for region in (within, ~within))
         rows.append((rise, -fall, mean, float(np.quantile(z, 0.99))))
         now = level[order], within[order]
         if before is not None:
@@ -143,11 +143,11 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     late = [n for n, time in enumerate(run.times) if time > 0.5 * run.times[-1]]
     velocity = np.mean([run.fluid("velocity", n)[..., 2] for n in late], axis=0)
     rows = slice(velocity.shape[1] // 2 - 1, velocity.shape[1] // 2 + 1)
-    seen = axes[-3].imshow(
+    air = axes[-3].imshow(
         velocity[:, rows].mean(axis=1), origin="lower", cmap="viridis", vmin=0.0,
         extent=(0.0, case.column.width, 0.0, case.column.height),
     )  # fmt: skip
-    drawn.colorbar(seen, ax=axes[-3], shrink=0.7, pad=0.04)
+    drawn.colorbar(air, ax=axes[-3], shrink=0.7, pad=0.04)
     axes[-3].set_title("air, upward  [m/s]", fontsize=9.5)
     tube = tube_of(case)
     ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
@@ -157,10 +157,10 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
             axis.plot(2 * [tube.point[0] + side * (tube.radius or 0.0)], ends, color=WALL, lw=1.6)
     for axis in axes[1:-2]:
         axis.set(ylabel="", yticklabels=[])
-    found, curve = circulation(run, case), axes[-2]
-    curve.plot(found.time, found.rising / 1e3, color=BLUE, label="rise in the tube")
-    curve.plot(found.time, found.falling / 1e3, color=ORANGE, label="fall around it")
-    curve.set(xlabel="time  [s]", ylim=(0.0, 1.4e-3 * float(np.nanmax(found.rising))))
+    pellets, curve = circulation(run, case), axes[-2]
+    curve.plot(pellets.time, pellets.rising / 1e3, color=BLUE, label="rise in the tube")
+    curve.plot(pellets.time, pellets.falling / 1e3, color=ORANGE, label="fall around it")
+    curve.set(xlabel="time  [s]", ylim=(0.0, 1.4e-3 * float(np.nanmax(pellets.rising))))
     curve.set_title("pellets in a second, thousands", fontsize=9.5)
     legend(curve, loc="upper right")
     carried = coating(run, case).liquid * CUBIC_MILLIMETRES
