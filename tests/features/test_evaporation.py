@@ -27,8 +27,8 @@ def failed(rows: list[Row]) -> list[Row]:
 
 
 def test_drops_come_to_the_wet_bulb_and_condense_as_in_mfix() -> None:
-    """On the way to condensation the laws differ: MFIX takes a difference of mass fractions, and a balance that does so,
-    too, follows it."""
+    """On the way to condensation the laws differ: MFIX takes a difference of mass fractions. A balance that does so
+    follows it."""
     rows = mfix({})
     off = {each.quantity: abs(each.difference or 0.0) for each in rows if each.limit is None}
     assert len(rows) == 9 and not failed(rows), failed(rows)
