@@ -12,7 +12,7 @@ from pydantic import Field
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable
-from cfddem.features.heat_keys import GROUP, Heat, transfer_number
+from cfddem.features.heat_keys import GROUP, Heat, given_or, transfer_number
 from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
     saturation_pressure,
@@ -111,8 +111,9 @@ class Evaporation(FeatureTable):
                 remedy = "cells do not take the vapour of walls"
                 raise InputError("evaporation.wall_coefficient", self.wall_coefficient, "0 with [vapour]", remedy)
         vapour, key = VapourTable.of(case), "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
-        shown = ("vapour.inlet_fraction", vapour.inflow) if vapour else (f"evaporation.{key}", getattr(self, key))
-        self._refuse_saturated(*shown, heat.gas_temperature, self.partial_pressure(case))
+        key = "vapour.inlet_fraction" if vapour else f"evaporation.{key}"
+        value = vapour.inflow if vapour else given_or(self.relative_humidity, self.vapour_fraction or 0.0)
+        self._refuse_saturated(key, value, heat.gas_temperature, self.partial_pressure(case))
         if vapour:
             of_air = {"vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature)}
             for name in vapour.patch_fraction.keys() | heat.patch_temperature.keys():
@@ -121,7 +122,7 @@ class Evaporation(FeatureTable):
             for where, (fraction, temperature) in sorted(of_air.items()):
                 self._refuse_saturated(where, fraction, temperature, vapour_pressure(fraction, self.pressure))
 
-    def _refuse_saturated(self, key: str, value: float | None, temperature: float, partial: float) -> None:
+    def _refuse_saturated(self, key: str, value: float, temperature: float, partial: float) -> None:
         """Refuse air above saturation, with a partial pressure of the vapour [Pa]."""
         saturated = saturation_pressure(temperature)
         if partial > SATURATED * saturated:

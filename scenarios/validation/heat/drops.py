@@ -83,7 +83,7 @@ def condensing_balance(rate: str, step: float = 1e-3) -> dict[float, float]:
     case = condensing("dilute")
     heat, keys, fluid = Heat.of(case), Evaporation.of(case), case.required_fluid
     assert heat and keys
-    gas, share, speed = heat.fluid_temperature, float(keys.vapour_fraction or 0.0), case.bed.inlet_velocity
+    gas, share, speed = heat.fluid_temperature, float(keys.vapour_fraction or 0.0), case.bed.highest_inlet_velocity
     density, capacity = case.material["water"].density, heat.heat_capacity["water"]
     spread = fluid.density * keys.diffusivity_in(case)
     prandtl, schmidt = fluid.viscosity * heat.fluid_heat_capacity / heat.conductivity, fluid.viscosity / spread
