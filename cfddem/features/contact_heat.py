@@ -18,7 +18,7 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
-from cfddem.features.heat import mean_temperature
+from cfddem.features.heat import LEAST, mean_temperature
 from cfddem.features.heat_keys import Heat
 from cfddem.features.heat_network import (
     LENS,
@@ -47,9 +47,10 @@ class HeatExchangeOfContacts(CaseFeature):
     radiated    heat received from the surroundings so far [J]
     gained      change of the heat of the particles by this exchange, from their temperatures [J]
     scale       heat that particles gained and lost so far, without sign [J]
+    held        heat capacity of all particles in the last exchange [J/K]
     """
 
-    name, table, kept = "contact heat", "contact_heat", ("from_walls", "radiated", "gained", "scale")
+    name, table, kept = "contact heat", "contact_heat", ("from_walls", "radiated", "gained", "scale", "held")
     measures = (
         Measured("mean_temperature", "K", "measure", "mean temperature of the particles, by heat capacity",
                  mean_temperature, lambda case: not Heat.of(case)),
@@ -60,7 +61,7 @@ class HeatExchangeOfContacts(CaseFeature):
                  lambda heat, _: heat.radiated),
         Measured("contact_heat_imbalance", "1", "imbalance",
                  "change of the heat in the particles that walls and surroundings did not give, over the heat "
-                 "exchanged", lambda heat, _: heat.imbalance),
+                 "exchanged, at least that of a thousandth of a kelvin", lambda heat, _: heat.imbalance),
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
@@ -70,7 +71,8 @@ class HeatExchangeOfContacts(CaseFeature):
         self.capacities = _capacities(case, keys)
         self.emissivities = keys.by_material(case, "emissivity", 0.0)
         self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
-        self.from_walls, self.radiated, self.gained, self.scale, self._step = 0.0, 0.0, 0.0, 0.0, 0.0
+        self.from_walls, self.radiated, self.gained, self.scale = 0.0, 0.0, 0.0, 0.0
+        self.held, self._step = float(simulation.communicator.sum(self.capacity(simulation.owned))), 0.0
         self.choices = Choices(
             contact={"none": NONE, "smooth": SMOOTH, "rough": ROUGH}[keys.contact],
             by_force=keys.radius == "hertz",
@@ -108,8 +110,12 @@ class HeatExchangeOfContacts(CaseFeature):
 
     @property
     def imbalance(self) -> float:
-        """Change of the heat in the particles that walls and surroundings did not give, over the heat exchanged [-]."""
-        return abs(self.gained - self.from_walls - self.radiated) / self.scale if self.scale > 0.0 else 0.0
+        """Change of the heat in the particles that walls and surroundings did not give, over the heat exchanged [-].
+
+        At least over that of a thousandth of a kelvin: where less was exchanged, rounding would be over rounding.
+        """
+        wrong = abs(self.gained - self.from_walls - self.radiated)
+        return wrong / max(self.scale, LEAST * self.held) if wrong > 0.0 else 0.0
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""
@@ -153,7 +159,7 @@ class HeatExchangeOfContacts(CaseFeature):
 
         at_walls = total(np.append(of_power, from_walls)), total(np.abs(np.append(of_power, from_walls)))
         gained = capacity * (particles.temperature - start)
-        radiated, gains, size = total([absorbed, gained, np.abs(absorbed)], axis=1).tolist()
+        radiated, gains, size, self.held = total([absorbed, gained, np.abs(absorbed), capacity], axis=1).tolist()
         self.from_walls += at_walls[0]
         self.radiated += radiated
         self.gained += gains

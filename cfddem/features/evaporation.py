@@ -229,14 +229,13 @@ class Menisci:
     def __init__(self, simulation: Any, density: float) -> None:
         solver, self.density = simulation.particle_solver, density
         self.solver, self.count = solver, solver.particles.owned
-        self.rows = np.flatnonzero(solver.edges.bridge_film > 0.0)
+        self.rows, self.known = np.flatnonzero(solver.edges.bridge_film > 0.0), BridgeSystem.of(solver.system)
         # two parts of every bridge, the first of all bridges, then the second; that at a wall has one
         parts = 2 * len(self.rows)
         self.body, self.parts, self.masses = np.empty(parts, np.int64), np.empty(parts), np.empty(parts)
         self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
         if parts:
-            system = BridgeSystem.of(solver.system)
-            menisci(self.rows, density, system, self.body, self.parts, self.masses, self.area, self.mass)
+            menisci(self.rows, density, self.known, self.body, self.parts, self.masses, self.area, self.mass)
 
     def lose(self, lost: np.ndarray) -> float:
         """Take from the bridges what every particle loses from its parts of them (N,) [kg]; returns the energy of the
@@ -250,7 +249,7 @@ class Menisci:
         taken_from(self.body, self.parts, self.masses, self.area, lost, taken)
         halves = self._of_all_owners(taken.reshape(2, -1).T)
         bridges: Bridges = self.solver.feature(Bridges)
-        return bridges.dry(self.rows, (halves[:, 0] + halves[:, 1]) / self.density)
+        return bridges.dry(self.rows, (halves[:, 0] + halves[:, 1]) / self.density, self.known)
 
     def _of_all_owners(self, halves: np.ndarray) -> np.ndarray:
         """Both parts of every bridge (n, 2) [kg], also where a particle of another rank has one."""

@@ -12,7 +12,7 @@ from pydantic import Field
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable
-from cfddem.features.heat_keys import GROUP, Heat, transfer_number
+from cfddem.features.heat_keys import GROUP, Heat, given_or, transfer_number
 from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
     saturation_pressure,
@@ -91,9 +91,12 @@ class Evaporation(FeatureTable):
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         self._refuse_humidity(case)
-        if not COLDEST <= heat.gas_temperature <= HOTTEST:
-            limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
-            raise InputError("heat.fluid_temperature", heat.gas_temperature, limit, "the laws are those of water")
+        gases = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
+        gases |= {f"patch_temperature.{name}": each for name, each in heat.patch_temperature.items()}
+        for where, temperature in gases.items():
+            if not COLDEST <= temperature <= HOTTEST:
+                limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
+                raise InputError(f"heat.{where}", temperature, limit, "the laws are those of water")
         for name in self.drops:
             if name not in case.material:
                 raise InputError("evaporation.drops", name, nearest(name, list(case.material)))
@@ -107,28 +110,25 @@ class Evaporation(FeatureTable):
             if VapourTable.of(case):
                 remedy = "cells do not take the vapour of walls"
                 raise InputError("evaporation.wall_coefficient", self.wall_coefficient, "0 with [vapour]", remedy)
-        saturated = saturation_pressure(heat.gas_temperature)
-        if self.partial_pressure(case) > SATURATED * saturated:
-            vapour = VapourTable.of(case)
-            key = "evaporation.vapour_fraction" if self.relative_humidity is None else "evaporation.relative_humidity"
-            value = self.vapour_fraction if self.relative_humidity is None else self.relative_humidity
-            if vapour:
-                key, value = "vapour.inlet_fraction", vapour.inflow
-            most = vapour_fraction(min(saturated, self.pressure), self.pressure)
-            remedy = f"the mass fraction of saturation at {heat.gas_temperature:g} K is {most:.4g}"
-            raise InputError(key, value, "at most saturated", remedy)
-        self._refuse_start(case)
+        vapour, key = VapourTable.of(case), "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
+        key = "vapour.inlet_fraction" if vapour else f"evaporation.{key}"
+        value = vapour.inflow if vapour else given_or(self.relative_humidity, self.vapour_fraction or 0.0)
+        self._refuse_saturated(key, value, heat.gas_temperature, self.partial_pressure(case))
+        if vapour:
+            of_air = {"vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature)}
+            for name in vapour.patch_fraction.keys() | heat.patch_temperature.keys():
+                warmth = heat.patch_temperature.get(name, heat.gas_temperature)
+                of_air[f"vapour.patch_fraction.{name}"] = vapour.patch_fraction.get(name, vapour.inflow), warmth
+            for where, (fraction, temperature) in sorted(of_air.items()):
+                self._refuse_saturated(where, fraction, temperature, vapour_pressure(fraction, self.pressure))
 
-    def _refuse_start(self, case: Any) -> None:
-        """Refuse air that is above saturation at the start."""
-        heat, vapour = Heat.of(case), VapourTable.of(case)
-        if not heat or not vapour or not COLDEST <= heat.fluid_temperature <= HOTTEST:
-            return
-        saturated = min(saturation_pressure(heat.fluid_temperature), self.pressure)
-        if vapour_pressure(vapour.fluid_fraction, self.pressure) > SATURATED * saturated:
-            most = vapour_fraction(saturated, self.pressure)
-            remedy = f"the mass fraction of saturation at {heat.fluid_temperature:g} K is {most:.4g}"
-            raise InputError("vapour.fluid_fraction", vapour.fluid_fraction, "at most saturated", remedy)
+    def _refuse_saturated(self, key: str, value: float, temperature: float, partial: float) -> None:
+        """Refuse air above saturation, with a partial pressure of the vapour [Pa]."""
+        saturated = saturation_pressure(temperature)
+        if partial > SATURATED * saturated:
+            most = vapour_fraction(min(saturated, self.pressure), self.pressure)
+            remedy = f"the mass fraction of saturation at {temperature:g} K is {most:.4g}"
+            raise InputError(key, value, "at most saturated", remedy)
 
     def _refuse_humidity(self, case: Any) -> None:
         """Refuse two humidities, or none; with `[vapour]` the humidity is that of the cells."""
@@ -172,9 +172,12 @@ class Evaporation(FeatureTable):
         return wet_bulb_temperature(heat.gas_temperature, fraction, self.pressure, ratio)
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
-        """Tell the wet-bulb temperature."""
+        """Tell the wet-bulb temperature, and what leaves no bond."""
         reason = f"the wet-bulb temperature is {self.wet_bulb(case):.2f} K at {case.reference_speed:g} m/s"
         yield "note", "evaporation", reason, "wet particles come to it while they dry at a constant rate"
+        if case.liquid and case.liquid.bond:
+            reason = "bonds form between particles; films, and bridges at walls, leave nothing when they dry"
+            yield "note", "liquid.bond", reason, "the solids of the liquid have no mass"
 
     def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
         """The wet bulb, the water that the air can carry, that of the spray, and the time of drying."""

@@ -102,8 +102,8 @@ class Vapour(CaseFeature):
         sent = np.stack([conductance, conductance * surface], axis=1)
         coefficient, product = kernel.spread(cell_map, sent) / kernel.grid.cell_volume
         fractions = self.cells.step(coefficient, product)
-        around = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(fractions), fractions]))
-        received = np.asarray(step * conductance * (around[:, 1] - around[:, 0] * surface))
+        around = kernel.sample(cell_map.stencil, cell_map.radius, fractions[None])[:, 0]
+        received = np.asarray(step * conductance * (around - surface))
         sums = self.communicator.sum([received, np.abs(received)], axis=1)
         self.received += float(sums[0])
         self.scale += float(sums[1])

@@ -236,13 +236,18 @@ def relax(value, stored, coefficient, target, step, missed):
 
     coefficient  over the capacity of the fluid [1/s]
     """
+    shape = value.shape
     value, stored, missed = value.reshape(-1), stored.reshape(-1), missed.reshape(-1)
     coefficient, target = coefficient.reshape(-1), target.reshape(-1)
-    for n in prange(len(value)):
-        stiffness = step * coefficient[n] / stored[n]
-        mean = (target[n] - value[n]) * mean_of_decay(stiffness)
-        value[n] += stiffness * mean
-        missed[n] += mean
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        now, e, rate = line(value, at, n), line(stored, at, n), line(coefficient, at, n)
+        towards, less = line(target, at, n), line(missed, at, n)
+        for i in range(n):
+            stiffness = step * rate[i] / e[i]
+            mean = (towards[i] - now[i]) * mean_of_decay(stiffness)
+            now[i] += stiffness * mean
+            less[i] += mean
 
 
 @threaded

@@ -143,6 +143,21 @@ def test_history_snapshot_and_checkpoint_have_the_heat_and_continue_with_the_sam
     assert np.array_equal(again.snapshot()["temperature"], simulation.snapshot()["temperature"])
 
 
+def test_rounding_of_temperatures_that_are_equal_is_no_imbalance() -> None:
+    """Two spheres of one temperature exchange nothing but rounding, which over itself would be of order 1."""
+    simulation = Simulation(two_spheres(-1.33e-7, 0.5, 10.0))
+    simulation.particles.temperature[:] = COLD
+    for _ in range(3):
+        simulation.step()
+    heat = simulation.feature(HeatExchangeOfContacts)
+    heat.gained, heat.scale = 1e-13 * heat.held, 1e-13 * heat.held  # as rounding leaves it
+    assert heat.held == pytest.approx(float(heat.capacity(simulation.particles).sum()), rel=1e-14)
+    assert heat.imbalance == pytest.approx(1e-10, rel=1e-6)  # of a thousandth of a kelvin
+    heat.gained = 1e-2 * heat.held  # heat from nowhere is seen as before
+    heat.scale = heat.gained
+    assert heat.imbalance == pytest.approx(1.0)
+
+
 def test_particles_that_move_exchange_heat_while_they_touch() -> None:
     """Two spheres of the gap test that fly towards each other, bounce and part."""
     case = two_spheres(1e-5, 1e-4, 1.0, {"held": False}, bed__initial_velocity=(0.0, 0.0, 0.0))

@@ -133,7 +133,45 @@ def test_films_give_their_water_to_the_air_from_the_inlet_on_and_then_warm_up() 
     assert particles.temperature[first] == pytest.approx(320.0, abs=0.3)
 
 
-@pytest.mark.slow  # as the test above
+@pytest.mark.slow  # walls with liquid are a law set of their own
+def test_water_of_bridges_at_walls_and_of_the_patches_below_them_is_all_found_in_the_air() -> None:
+    """Beads on a wet floor: what films, bridges at the floor and its patches lose is in the vapour of the cells and of
+    the air that left. Neither the latent heat nor the volume that evaporation has noted is used."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.07, "thickness": 2e-7, "wall_share": 0.5, "wall_thickness": 2e-7}
+    at_floor = [(x, y, 1e-3 - 1e-8) for x, y in ((2e-3, 2e-3), (6e-3, 2e-3), (2e-3, 6e-3), (6e-3, 6e-3))]
+    simulation = Simulation(
+        wet_bed(1, liquid=film).with_(**{"evaporation": {}, "bed.positions": at_floor, "bed.fixed": False})
+    )
+    particles, solver, sums = simulation.particles, simulation.particle_solver, simulation.feature(Vapour).cells.sums
+    bridges = solver.bridges
+    assert bridges is not None
+
+    def there() -> float:
+        """Water in films, bridges and patches [m3]."""
+        return float(particles.liquid.sum() + bridges.volume.sum()) + bridges.gained_by_walls
+
+    water = there()
+
+    def missing() -> float:
+        """Water that has left the solids and is not in the air, over all there was [-]."""
+        in_air = simulation.feature(Vapour).cells.content + sums["outflow"] - sums["inflow"]
+        return abs(998.0 * (water - there()) - in_air) / (998.0 * water)
+
+    simulation.until(0.02)
+    of_walls = bridges.bodies.reshape(-1, 2)[:, 1] < 0
+    print(f"{of_walls.sum()} bridges at the floor, {bridges.gained_by_walls / water:.3f} of the water from its patches")
+    assert of_walls.sum() == 4 and bridges.gained_by_walls < 0.0 and bridges.volume.min() > 0.0
+    assert missing() < 1e-9
+    while particles.liquid.any() and simulation.time < 0.3:
+        simulation.step()
+    then = bridges.volume.sum()
+    simulation.until(simulation.time + 0.01)
+    print(f"films dry at {simulation.time - 0.01:.3f} s; bridges lose {1.0 - bridges.volume.sum() / then:.2g} in 10 ms")
+    assert not particles.liquid.any() and bridges.volume.sum() < (1.0 - 1e-5) * then and missing() < 1e-9
+    assert row(simulation)["liquid_imbalance"] < 1e-12
+
+
+@pytest.mark.slow  # as the test above that one
 def test_drops_of_a_spray_bring_their_heat_and_all_budgets_close() -> None:
     """Cold drops on warm beads in warm air: heat of the air in, latent heat out, heat of the drops in, the rest is
     stored. A bead that receives more than one drop is between its temperature and that of the drops."""

@@ -78,6 +78,13 @@ def test_water_that_the_air_carries_takes_the_heat_by_which_it_cools() -> None:
     assert found["drying time"] == pytest.approx(water / (found["water that the air can carry"] * reached), rel=1e-3)
 
 
+def test_what_leaves_no_bond_is_told() -> None:
+    bond = {"solid_fraction": 0.1, "youngs_modulus": 2e6, "tensile_strength": 1e6}
+    (found,) = (each for each in preflight(case_of(liquid__bond=bond)).issues if each.key == "liquid.bond")
+    assert found.severity == "note" and "bridges at walls" in found.reason
+    assert not [each for each in preflight(case_of()).issues if each.key == "liquid.bond"]
+
+
 @pytest.mark.parametrize(("share", "severity"), [(0.5, None), (0.9, "note"), (1.2, "warning")])
 def test_a_spray_that_the_air_cannot_carry_is_told_with_the_rate_that_it_can(share: float, severity: str) -> None:
     most = numbers(case_of())["water that the air can carry"] / 998.0
@@ -106,6 +113,10 @@ def test_a_solid_that_conducts_badly_is_warned_of_and_one_of_unknown_conductivit
     assert [each for each in of_contacts if each.key == "contact_heat.conductivity.glass"]
 
 
+PATCH = {"patch__jet": {"kind": "inlet", "shape": "disc", "diameter": 0.01, "velocity": 0.9}}
+"""An inlet with a name."""
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -124,6 +135,16 @@ def test_a_solid_that_conducts_badly_is_warned_of_and_one_of_unknown_conductivit
             r"vapour.fluid_fraction.*at most saturated; .*at 350 K is 0.30",
         ),
         ({"heat__fluid_temperature": 60.0}, r"heat.fluid_temperature.*253 to 640 K"),
+        ({"heat__inlet_temperature": 700.0}, r"heat.inlet_temperature.*253 to 640 K"),
+        (
+            PATCH | {"vapour__patch_fraction": {"jet": 0.4}},
+            r"vapour.patch_fraction.jet.*at most saturated; .*at 350 K is 0.30",
+        ),
+        (
+            PATCH | {"vapour__inlet_fraction": 0.2, "heat__patch_temperature": {"jet": 310.0}},
+            r"vapour.patch_fraction.jet.*at most saturated; .*at 310 K is 0.03",
+        ),
+        (PATCH | {"heat__patch_temperature": {"jet": 60.0}}, r"heat.patch_temperature.jet.*253 to 640 K"),
     ],
 )
 def test_impossible_heat_and_humidity_are_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
