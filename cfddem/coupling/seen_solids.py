@@ -13,6 +13,14 @@ deviation :math:`\sigma` of the kernel. m is the change of x over :math:`\sigma`
 last layer. In a small wave the weights drop out, and what is left is the kernel twice,
 :math:`\exp(-k^2\sigma^2)`.
 
+A particle above the surface must fall back onto it, or the surface would spread: it sees looser surroundings than the
+bed. At the plane surface of an even bed x is half of that within, whatever the symmetric kernel. Where it is less, the
+particle is no part of the bed, and
+
+.. math:: \varphi_i \to \min(\varphi_i, 2 x_i)
+
+so that what it sees is continuous at the surface, and that of the particles of an even bed does not change.
+
 The cells of this mean are parts of those of the fluid, small enough for :math:`\sigma`. So what a particle sees does
 not depend on the cells of the fluid. Of particles of unequal sizes each sees with the :math:`\sigma` of its own size.
 """
@@ -36,6 +44,9 @@ MOST_PARTS = 4
 
 SHARPNESS = 0.15
 """m_0, the relative change of x over the standard deviation of the kernel at which the weight of a particle falls."""
+
+AT_SURFACE = 0.5
+"""x over the solid fraction of an even bed at its plane surface, for any kernel that is symmetric."""
 
 LEAST_WEIGHT = 1e-4
 """Least weight: a lone particle or a row of them sees its own surroundings."""
@@ -69,8 +80,8 @@ class SeenSolids:
         _weigh(gathered, cell_map.volume, cells.width(cell_map.radius) / SHARPNESS, weighted, self.change)
         sums = self._summed(weighted)
         self._weights, self._sums = weighted[:, 1], sums[:, 1]
-        mean: Array = sums[:, 0] / sums[:, 1]
-        return mean
+        surroundings: Array = weighted[:, 0] / weighted[:, 1]
+        return np.minimum(sums[:, 0] / sums[:, 1], surroundings / AT_SURFACE)
 
     def averaged(self, values: Array) -> Array:
         """The same mean of values of the particles that `around` was called with (N, m)."""

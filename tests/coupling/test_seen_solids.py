@@ -141,6 +141,25 @@ def test_a_small_wave_is_seen_alike_in_all_cells(cell: float) -> None:
     assert np.mean(changes) == pytest.approx(solid * shift * math.exp(-((number * sigma) ** 2)), rel=0.01)
 
 
+def test_a_bead_above_a_bed_sees_looser_surroundings_with_its_height() -> None:
+    """Twice the part of the kernel that lies in the bed, so that it falls back; the last layer sees the bed."""
+    sigma, solid, top = 1.5, math.pi / 6.0, 10.0
+    kernel = FilterKernel(Grid((12, 12, 30), (1.0,) * 3), (True, True, False), smoothing=sigma)
+    seen = SeenSolids(kernel)
+    line = np.arange(12) + 0.5
+    bed = np.stack(np.meshgrid(line, line, line[:10], indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def around(position: Array) -> Array:
+        return seen.around(kernel.map_particles(position, np.full(len(position), 0.5)))
+
+    assert around(bed)[bed[:, 2] > top - 1.0] == pytest.approx(solid, rel=0.05)
+    own = around(np.array([[6.0, 6.0, 20.0]]))[0]
+    for height in (1.0, 2.0, 3.0):
+        found = around(np.concatenate([bed, [[6.0, 6.0, top + height]]]))[-1]
+        part = 0.5 * math.erfc(height / sigma / math.sqrt(2.0))
+        assert found == pytest.approx(2.0 * (solid * part + own), abs=0.04)
+
+
 def test_a_lone_sphere_sees_only_itself() -> None:
     """Its own part is all that it sees, at every place in a cell, and nearly so beside a wall."""
     grid = Grid((12, 12, 12), (2.5e-3,) * 3)
