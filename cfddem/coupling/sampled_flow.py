@@ -153,7 +153,7 @@ class FlowSampler:
 
 
 @threaded
-def _sample(gathered, spheres, own, density, found):
+def _sample(gathered, spheres, own, density, flow):
     """Write slip, self-disturbance, voidage, Reynolds number and number of others, without the particle's own part.
 
     gathered  mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
@@ -161,14 +161,14 @@ def _sample(gathered, spheres, own, density, found):
     own       `Own`; solid fractions of zero switch the correction off
     """
     for n in prange(len(gathered)):
-        _find_undisturbed(n, gathered, spheres, own, density, found)
+        _find_undisturbed(n, gathered, spheres, own, density, flow)
 
 
 @inline
-def _find_undisturbed(n, gathered, spheres, own, density, found):
+def _find_undisturbed(n, gathered, spheres, own, density, flow):
     """`_sample` of one particle."""
     volume, radius, velocity, viscosity = spheres
-    slip, disturbance, voidage, reynolds, others = found
+    slip, disturbance, voidage, reynolds, others = flow
     solid, alone = gathered[n, 3], own.solid[n]
     share = min(max(alone / max(solid, 1e-300), 0.0), 1.0)
     others[n] = max(solid - alone, 0.0) / volume[n]

@@ -92,7 +92,7 @@ class Evaporation(FeatureTable):
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         self._refuse_humidity(case)
         gases = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
-        gases |= {f"patch_temperature.{name}": each for name, each in heat.patch_temperature.items()}
+        gases |= {f"patch_temperature.{name}": value for name, value in heat.patch_temperature.items()}
         for where, temperature in gases.items():
             if not COLDEST <= temperature <= HOTTEST:
                 limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"

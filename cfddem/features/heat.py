@@ -212,11 +212,11 @@ class HeatExchange(CaseFeature):
             self.response = step / capacity
         particles.temperature += received / capacity
         after = self._above(particles, capacity)
-        given, scale, held, holds = total([received, np.abs(received), before, after], axis=1).tolist()
-        self.given += given
+        exchanged, scale, heat_before, heat_after = total([received, np.abs(received), before, after], axis=1).tolist()
+        self.given += exchanged
         self.scale += scale
-        self.other += held - self.last
-        self.last = holds
+        self.other += heat_before - self.last
+        self.last = heat_after
 
     def _from_uniform(self, particles: Any, capacity: np.ndarray, conductance: np.ndarray, step: float) -> np.ndarray:
         """Heat that every particle receives from a fluid of one temperature (N,) [J]."""
@@ -239,9 +239,10 @@ class HeatExchange(CaseFeature):
         kernel, cell_map = self.transfer.kernel, terms.cell_map
         self.transfer.last_step = 0.0
         sent = self.transfer.prepare(particles, cell_map, self.conductance(terms), step)
-        seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])
+        temperatures = cells.step(sent.cell_conductance, sent.cell_product[..., 0])
         humid = [simulation.feature(Vapour).cells.value] if self.humid else []
-        gathered = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(seen), seen, *humid]))
+        fields = np.stack([np.ones_like(temperatures), temperatures, *humid])
+        gathered = kernel.sample(cell_map.stencil, cell_map.radius, fields)
         rate = self.transfer.receive(particles, sent, gathered)[:, 0]
         self.around, self.humidity = particles.temperature + rate / sent.implicit, gathered[:, -1]
         return np.asarray(step * rate)
@@ -252,8 +253,8 @@ class HeatExchange(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """The temperature of the fluid and the balance."""
-        found = super().checkpoint() | {"outside": self.communicator.sum([self.law.outside])}
-        return found if self.cells is None else found | {"cells": self.cells.checkpoint()}
+        state = super().checkpoint() | {"outside": self.communicator.sum([self.law.outside])}
+        return state if self.cells is None else state | {"cells": self.cells.checkpoint()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""

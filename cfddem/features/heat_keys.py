@@ -125,9 +125,9 @@ class Heat(FeatureTable):
             raise InputError("fluid.viscosity", 0.0, "above 0 with [heat]", "the law of heat needs a Reynolds number")
         for table in ("heat_capacity", "solid_conductivity"):
             if unknown := sorted(getattr(self, table).keys() - case.material.keys()):
-                known = ", ".join(case.material)
-                raise InputError(f"heat.{table}.{unknown[0]}", None, f"one of the materials {known}")
-        for name in sorted({case.material_name_of(each) for each in case.species.values()}):
+                materials = ", ".join(case.material)
+                raise InputError(f"heat.{table}.{unknown[0]}", None, f"one of the materials {materials}")
+        for name in sorted({case.material_name_of(species) for species in case.species.values()}):
             if name not in self.heat_capacity:
                 raise InputError(
                     f"heat.heat_capacity.{name}", None, "given: particles are of this material", "[J/kg/K]"
@@ -211,10 +211,10 @@ class Heat(FeatureTable):
         for name in (*self.wall_temperature, *self.wall_flux):
             named = [name]
             if name == AROUND:
-                named = [each for each in self.names_of_walls(case) if each[0] in "xy"]
+                named = [side for side in self.names_of_walls(case) if side[0] in "xy"]
                 named += [SOLID] if case.column.shape == "cylinder" or case.vessel else []
-            for each in named:
-                area = round_wall if each[0] in "xys" else 1.0
+            for side in named:
+                area = round_wall if side[0] in "xys" else 1.0
                 if name in self.wall_flux:
                     wall: Wall = FluxWall(self.wall_flux[name], area)
                 elif name in self.wall_coefficient:
@@ -222,38 +222,40 @@ class Heat(FeatureTable):
                 else:
                     wall = HeldWall(self.wall_temperature[name], area)
                 if name == AROUND:
-                    walls.setdefault(each, wall)
+                    walls.setdefault(side, wall)
                 else:
-                    walls[each] = wall
+                    walls[side] = wall
         return ScalarSides(self.gas_temperature, self.outlet_temperature, walls)
 
     def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
         """Numbers of the largest particles in the flow of the bed, and times of heating."""
-        fluid, largest = case.fluid, max(case.species.values(), key=lambda each: each.diameter)
+        fluid, largest = case.fluid, max(case.species.values(), key=lambda species: species.diameter)
         reynolds, prandtl = reynolds_of(case, bed), fluid.viscosity * self.fluid_heat_capacity / self.conductivity
         nusselt = self.nusselt(case, bed)
         yield GROUP, "Pr", prandtl, "", "Prandtl number"
         yield GROUP, "Pe", reynolds * prandtl, "", "Peclet number of a particle, Re Pr"
         yield GROUP, "Nu", nusselt, "", f"Nusselt number at Re = {reynolds:.3g}"
-        biots = [nusselt * self.conductivity / (6.0 * each) for each in self.solid_conductivity.values()]
+        biots = [nusselt * self.conductivity / (6.0 * solid) for solid in self.solid_conductivity.values()]
         missing = "h d / (6 k); the limit is 0.1" if biots else "give heat.solid_conductivity"
         yield GROUP, "Bi", max(biots, default=math.nan), "", f"Biot number: {missing}"
         solid = case.material_of(largest).density * self.heat_capacity[case.material_name_of(largest)]
         time = solid * largest.diameter**2 / (6.0 * nusselt * self.conductivity)
         yield GROUP, "heating time of a particle", time, "s", "m c / (h A), of the largest species"
         if bed.inflow > 0.0 and self.in_cells(case):
-            held = sum(
-                case.volumes[name] * case.material_of(each).density * self.heat_capacity[case.material_name_of(each)]
-                for name, each in case.species.items()
+            capacity = sum(
+                case.volumes[name]
+                * case.material_of(species).density
+                * self.heat_capacity[case.material_name_of(species)]
+                for name, species in case.species.items()
             )
-            time = held / (bed.inflow * fluid.density * self.fluid_heat_capacity)
+            time = capacity / (bed.inflow * fluid.density * self.fluid_heat_capacity)
             yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where the density differs too much for the approximation of Boussinesq."""
         of_others = (*self.wall_temperature.values(), *self.patch_temperature.values())
         others = (self.gas_temperature, self.particle_temperature, *of_others)
-        largest = max(abs(each - self.fluid_temperature) for each in others)
+        largest = max(abs(temperature - self.fluid_temperature) for temperature in others)
         if self.buoyancy != "none" and self.expansion_coefficient * largest > BOUSSINESQ:
             share = 100.0 * self.expansion_coefficient * largest
             reason = f"temperatures differ by {largest:.3g} K and densities by {share:.2g} %; it holds up to 10 %"
@@ -268,7 +270,7 @@ class Heat(FeatureTable):
         self, case: Any, bed: Any, key: str, of_solid: Mapping[str, float]
     ) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature, by the conductivities of a key."""
-        for name in sorted({case.material_name_of(each) for each in case.species.values()} & of_solid.keys()):
+        for name in sorted({case.material_name_of(species) for species in case.species.values()} & of_solid.keys()):
             biot = self.nusselt(case, bed) * self.conductivity / (6.0 * of_solid[name])
             if biot > LARGEST_BIOT:
                 reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds_of(case, bed):.3g}"
@@ -288,7 +290,7 @@ def reynolds_of(case: Any, bed: Any) -> float:
     """Reynolds number of the largest particles, superficial; at the reference speed where nothing flows in."""
     if bed.inlet > 0.0:
         return float(bed.reynolds)
-    largest = max(each.diameter for each in case.species.values())
+    largest = max(species.diameter for species in case.species.values())
     return float(case.fluid.density * case.reference_speed * largest / case.fluid.viscosity)
 
 

@@ -45,9 +45,9 @@ def terminal_velocities(curves: Curves) -> list[Row]:
     for reynolds in REYNOLDS:
         falls = [settling.fall(reynolds, cell, place=place) for cell in CELLS for place in PLACES]
         limit = 0.05 if reynolds < 0.1 else 0.02
-        points = [(each.cell, each.velocity, 1.0) for each in falls]
+        points = [(fall.cell, fall.velocity, 1.0) for fall in falls]
         rows.append(worst(f"one sphere, Re {reynolds:g}: terminal velocity over that of the drag law", points, limit))
-        with_own.append(max((each.velocity for each in falls), key=lambda v: abs(v - 1.0)))
+        with_own.append(max((fall.velocity for fall in falls), key=lambda v: abs(v - 1.0)))
         without.append(settling.fall(reynolds, 4.0, self_disturbance=False).velocity)
         rows.append(
             Row(f"one sphere, Re {reynolds:g}: without self-disturbance correction", without[-1], 1.0, note="cell 4 d")
@@ -91,15 +91,17 @@ def released(curves: Curves) -> list[Row]:
 def remembered(curves: Curves) -> list[Row]:
     """The history force of given motions, against direct convolutions with its kernel."""
     steady, steps = history_force.turning(100_000), (10, 100, 1000, 9999, 99_999)
-    found = history_force.modelled(steady)[list(steps)]
+    modelled = history_force.modelled(steady)[list(steps)]
     exact = history_force.convolved(steady, "present", steps)
-    points = [(float(at), history_force.difference(*pair), 0.0) for at, *pair in zip(steps, found, exact)]
+    points = [(float(at), history_force.difference(*pair), 0.0) for at, *pair in zip(steps, modelled, exact)]
     title = "history force, slip that turns at constant speed, 1e5 steps: deviation from the convolution"
     rows = [worst(title, points, 2e-3, note="steps of 2 % of t_c")]
     impulses = history_force.around_impact()
-    deviations = [abs(each.package - each.quadrature) for each in impulses]
+    deviations = [abs(impulse.package - impulse.quadrature) for impulse in impulses]
     title = "history force around an impact at St 152: impulse over that of the fall, deviation from quadrature"
-    rows.append(Row(title, max(deviations), 0.0, 1e-4, note=f"of {sum(each.quadrature for each in impulses):.4f}"))
+    rows.append(
+        Row(title, max(deviations), 0.0, 1e-4, note=f"of {sum(impulse.quadrature for impulse in impulses):.4f}")
+    )
     motions = {
         "0.5 mm glass from rest in water": {0.0: history_force.from_rest()},
         "slip that oscillates by 0.8 of its mean": {x: history_force.oscillating(x) for x in (0.1, 1.0, 10.0)},
@@ -159,15 +161,15 @@ class Oil(NamedTuple):
 
 def _oils() -> dict[str, Oil]:
     """Oils by the name of their case; where the largest speed is not printed, by its ratio to u_inf."""
-    listed, found = reference("tencate2002_cases"), {}
+    listed, oils = reference("tencate2002_cases"), {}
     for row, case in enumerate(listed["case"]):
         density, viscosity, endless, ratio = (
             float(listed[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max_over_u_inf [-]")
         )
         printed = listed["u_max [m/s]"][row]
         fastest = float(printed) if printed[0].isdigit() else ratio * endless
-        found[case] = Oil(density, viscosity, endless, fastest)
-    return found
+        oils[case] = Oil(density, viscosity, endless, fastest)
+    return oils
 
 
 def dem06(curves: Curves) -> list[Row]:
@@ -183,7 +185,7 @@ def packed(curves: Curves) -> list[Row]:
     for drag in ("ergun", "wen_yu", "di_felice"):
         case = packed_bed.case(**{"laws.drag": drag})
         drops = [packed_bed.flow_through(case, velocity) for velocity in np.geomspace(1.5e-3, 15.0, 5)]
-        points = [(each.reynolds, each.measured / each.formula, 1.0) for each in drops]
+        points = [(drop.reynolds, drop.measured / drop.formula, 1.0) for drop in drops]
         rows.append(worst(f"packed bed, {drag}, Re 0.01 to 100: pressure drop over the formula", points, 0.01))
     listed = numbers("cfdem_ergun_test_dp")
     points = []

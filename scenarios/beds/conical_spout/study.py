@@ -87,9 +87,9 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
         shown, _ = draw_spheres(axis, run, case, time, reach=1.0, size=20.0, most=0.6)
         draw_vessel(axis, case, 0.6 * case.column.height)
         axis.set_title(f"{shown:.2f} s, {case.patch['nozzle'].speed(shown):.3g} m/s", fontsize=9.5)
-    seen, curve = spouting(run, case), axes[-1]
-    curve.plot(seen.time, seen.voidage, color=BLUE, label="lowest voidage on the axis")
-    curve.plot(seen.time, seen.velocity / olazar(case), color=ORANGE, label="velocity / Olazar et al.")
+    spout, curve = spouting(run, case), axes[-1]
+    curve.plot(spout.time, spout.voidage, color=BLUE, label="lowest voidage on the axis")
+    curve.plot(spout.time, spout.velocity / olazar(case), color=ORANGE, label="velocity / Olazar et al.")
     curve.plot(
         run.history["time"], run.history["pressure_drop"] / 1e3, color=GREY, lw=1.0, label="pressure drop  [kPa]"
     )

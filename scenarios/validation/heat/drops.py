@@ -42,12 +42,12 @@ def drop(diameter: float, speed: float, until: float, thermal: dict[str, Any], *
     thermal  keys of [heat]
     changes  of the case, with __ for the point
     """
-    given: dict[str, Any] = {
+    keys: dict[str, Any] = {
         "fluid": HUMID,
         "material.water": {"density": 958.6, "youngs_modulus": 1e6, "poisson": 0.25},
         "evaporation": {"drops": ["water"], "vapour_fraction": 0.013135, "rate": "dilute"},
     }
-    return in_a_stream(diameter, speed, until, {"heat_capacity": {"water": 4180.0}} | thermal, **given | changes)
+    return in_a_stream(diameter, speed, until, {"heat_capacity": {"water": 4180.0}} | thermal, **keys | changes)
 
 
 def wet_bulb(**changes: Any) -> Case:
@@ -88,7 +88,7 @@ def condensing_balance(rate: str, step: float = 1e-3) -> dict[float, float]:
     spread = fluid.density * keys.diffusivity_in(case)
     prandtl, schmidt = fluid.viscosity * heat.fluid_heat_capacity / heat.conductivity, fluid.viscosity / spread
     partial, diameter = vapour_pressure(share, keys.pressure), case.bed.largest_diameter
-    mass, temperature, found = density * math.pi / 6.0 * diameter**3, float(heat.particle_temperature), {}
+    mass, temperature, by_time = density * math.pi / 6.0 * diameter**3, float(heat.particle_temperature), {}
     for n in range(1, round(max(CONDENSING) / step) + 1):
         saturation = saturation_pressure(temperature)
         surface = vapour_fraction(saturation, keys.pressure)
@@ -103,26 +103,26 @@ def condensing_balance(rate: str, step: float = 1e-3) -> dict[float, float]:
         temperature += (step * warmed - latent_heat(temperature) * lost) / (mass * capacity)
         mass -= lost
         diameter = (6.0 * mass / (math.pi * density)) ** (1.0 / 3.0)
-        found[round(n * step, 9)] = temperature - ZERO
-    return {time: found[time] for time in CONDENSING}
+        by_time[round(n * step, 9)] = temperature - ZERO
+    return {time: by_time[time] for time in CONDENSING}
 
 
 def mfix(curves: Curves) -> list[Row]:
     """A drop that evaporates, and one on which vapour condenses, as in MFIX."""
-    found, _ = followed(wet_bulb(), [*WET_BULB, 10.0])
-    points = [(time, found[time][0] - ZERO, value) for time, value in WET_BULB.items()]
+    drop_at, _ = followed(wet_bulb(), [*WET_BULB, 10.0])
+    points = [(time, drop_at[time][0] - ZERO, value) for time, value in WET_BULB.items()]
     rows = [
         worst("drop in air, MFIX: temperature on the way", points, 0.03, unit="degC"),
-        Row("drop in air, MFIX: wet bulb", found[10.0][0] - ZERO, PLATEAU, 0.1, "degC"),
+        Row("drop in air, MFIX: wet bulb", drop_at[10.0][0] - ZERO, PLATEAU, 0.1, "degC"),
     ]
     for rate in ("dilute", "stefan"):
-        found, _ = followed(condensing(rate), CONDENSING)
-        points = [(time, found[time][0] - ZERO, value) for time, value in CONDENSING.items()]
+        drop_at, _ = followed(condensing(rate), CONDENSING)
+        points = [(time, drop_at[time][0] - ZERO, value) for time, value in CONDENSING.items()]
         rows.append(Row(f"condensation, {rate}, MFIX: temperature at 4 s", *points[-1][1:], 0.3, "degC"))
         note = "MFIX condenses by the difference of mass fractions"
         rows.append(worst(f"condensation, {rate}, MFIX: temperature on the way", points[:-1], unit="degC", note=note))
         expected = condensing_balance(rate)
-        points = [(time, found[time][0] - ZERO, expected[time]) for time in CONDENSING]
+        points = [(time, drop_at[time][0] - ZERO, expected[time]) for time in CONDENSING]
         rows.append(worst(f"condensation, {rate}, balance: temperature", points, 0.15, unit="degC"))
     points = [(time, value, CONDENSING[time]) for time, value in condensing_balance(BY_FRACTIONS).items()]
     rows.append(worst("balance with the rate of MFIX, MFIX: temperature", points, 0.5, unit="degC"))
@@ -162,22 +162,22 @@ def fujita(curves: Curves) -> list[Row]:
     """Suspended drops, beside the measurements of Fujita."""
     rows = []
     for (speed, fraction), measured in SHRUNK.items():
-        simulation, found = Simulation(suspended(speed, fraction)), {}
+        simulation, drop_at = Simulation(suspended(speed, fraction)), {}
         for time in sorted({*TIMES, *WARM_TIMES}):
             simulation.until(time)
             size = float(simulation.particles.radius[0] / 0.6e-3) ** 2
-            found[time] = size, float(simulation.particles.temperature[0] - 288.15)
+            drop_at[time] = size, float(simulation.particles.temperature[0] - 288.15)
         name = f"drop of Fujita, {speed:g} m/s, {'30 %' if fraction else '0 %'} humidity"
-        points = [(time, found[time][0], value) for time, value in zip(TIMES, measured)]
+        points = [(time, drop_at[time][0], value) for time, value in zip(TIMES, measured)]
         rows.append(worst(f"{name}: (d/d0)^2 up to 25 s", points[:-1], 0.025))
         rows.append(Row(f"{name}: (d/d0)^2 at 30 s", *points[-1][1:], 0.02))
         if (speed, fraction) in WARMED:
-            warm = [(time, found[time][1], value) for time, value in zip(WARM_TIMES, WARMED[speed, fraction])]
+            warm = [(time, drop_at[time][1], value) for time, value in zip(WARM_TIMES, WARMED[speed, fraction])]
             note = "" if fraction else "heat through the suspension"
             rows.append(worst(f"{name}: T - T0", warm, 0.5 if fraction else None, unit="K", note=note))
         curves[f"fujita/{speed:g} m per s, vapour {fraction:g}"] = {
-            "time": (np.array(sorted(found)), "s"),
-            "area": (np.array([found[time][0] for time in sorted(found)]), "-"),
-            "warmed": (np.array([found[time][1] for time in sorted(found)]), "K"),
+            "time": (np.array(sorted(drop_at)), "s"),
+            "area": (np.array([drop_at[time][0] for time in sorted(drop_at)]), "-"),
+            "warmed": (np.array([drop_at[time][1] for time in sorted(drop_at)]), "K"),
         }
     return rows
