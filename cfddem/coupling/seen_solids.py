@@ -19,7 +19,8 @@ particle is no part of the bed, and
 
 .. math:: \varphi_i \to \min(\varphi_i, 2 x_i)
 
-so that what it sees is continuous at the surface, and that of the particles of an even bed does not change.
+so that what it sees is continuous at the surface, and that of the particles of an even bed does not change. Its own
+part of x, which the drag leaves out, counts twice there.
 
 The cells of this mean are parts of those of the fluid, small enough for :math:`\sigma`. So what a particle sees does
 not depend on the cells of the fluid. Of particles of unequal sizes each sees with the :math:`\sigma` of its own size.

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.seen_solids import SeenSolids, cells_of
@@ -23,7 +24,34 @@ PITCH, LAYER = 0.01 / 9, 81
 """Of a cubic lattice of glass spheres of 1 mm in a column of 10 mm, and spheres in a layer [m]."""
 
 SPHERE = math.pi / 6.0 * 1e-9
+WEIGHT = (2500.0 - 998.0) * 9.81 * SPHERE
+"""Volume of a sphere [m3], and its weight in water [N]."""
+
 SIDES = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
+
+
+def lattice(layers: int, below: int = 0) -> list[tuple[float, float, float]]:
+    """Centres of the spheres of a cubic lattice [m].
+
+    below  layers that are left out above the floor
+    """
+    return [((i + 0.5) * PITCH, (j + 0.5) * PITCH, (k + 0.5) * PITCH)
+            for k in range(below, below + layers) for j in range(9) for i in range(9)]  # fmt: skip
+
+
+def flow_through(places: list[tuple[float, float, float]], velocity: float, cell: float) -> Simulation:
+    """Steady flow through spheres that are held at their places."""
+    bed = {"start": "placed", "positions": places, "count": None, "fixed": True}
+    laws = {"laws.agitation": "none", "laws.surface": "sharp"}
+    case = glass(velocity).with_(**{f"bed.{key}": value for key, value in bed.items()}, **{"column.cell": cell}, **laws)
+    simulation = Simulation(case)
+    simulation.until(0.05)
+    return simulation
+
+
+def drop_of_the_law(velocity: float) -> float:
+    """Pressure gradient of the drag law within the lattice [Pa/m]."""
+    return pressure_gradient(velocity, 1e-3, 998.0, 1e-3, 1.0 - SPHERE / PITCH**3, di_felice)
 
 
 def fixed_bed(layers: int, cell: float, below: int = 0) -> tuple[float, Array]:
@@ -33,17 +61,10 @@ def fixed_bed(layers: int, cell: float, below: int = 0) -> tuple[float, Array]:
 
     below  layers that are left out above the floor
     """
-    places = [((i + 0.5) * PITCH, (j + 0.5) * PITCH, (k + 0.5) * PITCH)
-              for k in range(below, below + layers) for j in range(9) for i in range(9)]  # fmt: skip
-    bed = {"start": "placed", "positions": places, "count": None, "fixed": True}
-    laws = {"laws.agitation": "none", "laws.surface": "sharp"}
-    case = glass(0.03).with_(**{f"bed.{key}": value for key, value in bed.items()}, **{"column.cell": cell}, **laws)
-    simulation = Simulation(case)
-    simulation.until(0.05)
-    voidage = 1.0 - SPHERE / PITCH**3
-    law = layers * PITCH * pressure_gradient(0.03, 1e-3, 998.0, 1e-3, voidage, di_felice)
+    simulation = flow_through(lattice(layers, below), 0.03, cell)
+    law = layers * PITCH * drop_of_the_law(0.03)
     particles = simulation.particles
-    force = particles.applied[:, 2] + (2500.0 - 998.0) * 9.81 * SPHERE
+    force = particles.applied[:, 2] + WEIGHT
     layer = np.floor(particles.position[:, 2] / PITCH).astype(int)
     means = np.array([force[layer == k].mean() for k in reversed(range(below, below + layers))])
     return history.row(simulation)["pressure_drop"] / law, means * layers * LAYER / (law * 1e-4)
@@ -75,6 +96,16 @@ def test_a_plug_has_one_sharp_surface_that_downstream() -> None:
     layers = fixed_bed(6, 5e-3 / 3.0, below=8)[1]
     assert layers[:4].min() > 0.8
     assert 0.3 < layers[-1] < 0.6
+
+
+def test_a_bead_above_a_bed_in_balance_falls_back() -> None:
+    """Spheres in the lattice are nearly carried by the flow; one two diameters above them is not."""
+    velocity = brentq(lambda speed: drop_of_the_law(speed) * PITCH**3 - WEIGHT, 1e-3, 0.1)
+    above = (5e-3, 5e-3, 6.0 * PITCH + 2e-3)
+    net = flow_through([*lattice(6), above], velocity, 5e-3 / 3.0).particles.applied[:, 2] / WEIGHT
+    layers = net[:-1].reshape(6, LAYER).mean(axis=1)
+    assert layers == pytest.approx(0.0, abs=0.1)
+    assert net[-1] < -0.5
 
 
 @pytest.mark.slow
@@ -142,7 +173,7 @@ def test_a_small_wave_is_seen_alike_in_all_cells(cell: float) -> None:
 
 
 def test_a_bead_above_a_bed_sees_looser_surroundings_with_its_height() -> None:
-    """Twice the part of the kernel that lies in the bed, so that it falls back; the last layer sees the bed."""
+    """Twice the part of the kernel that lies in the bed, and twice its own; the last layer sees the bed."""
     sigma, solid, top = 1.5, math.pi / 6.0, 10.0
     kernel = FilterKernel(Grid((12, 12, 30), (1.0,) * 3), (True, True, False), smoothing=sigma)
     seen = SeenSolids(kernel)
@@ -155,9 +186,9 @@ def test_a_bead_above_a_bed_sees_looser_surroundings_with_its_height() -> None:
     assert around(bed)[bed[:, 2] > top - 1.0] == pytest.approx(solid, rel=0.05)
     own = around(np.array([[6.0, 6.0, 20.0]]))[0]
     for height in (1.0, 2.0, 3.0):
-        found = around(np.concatenate([bed, [[6.0, 6.0, top + height]]]))[-1]
+        upper = around(np.concatenate([bed, [[6.0, 6.0, top + height]]]))[-1]
         part = 0.5 * math.erfc(height / sigma / math.sqrt(2.0))
-        assert found == pytest.approx(2.0 * (solid * part + own), abs=0.04)
+        assert upper == pytest.approx(2.0 * (solid * part + own), rel=0.1, abs=0.012)
 
 
 def test_a_lone_sphere_sees_only_itself() -> None:
