@@ -156,7 +156,7 @@ def test_damaged_settings_of_other_packages_in_the_working_folder_disturb_no_com
     for name in ("matplotlibrc", ".numba_config.yaml"):
         (folder / name).write_bytes(b"\xff{[" * 9)
     trap, where = Trap(folder, tmp_path / "mark"), {"PYTHONPATH": str(HOME)}
-    done = execute(trap, script(), "view . --history", **where)
+    done = execute(trap, script(), "report .", **where)
     assert (done.returncode, done.stderr) == (0, "")
     again = "import cfddem, pyvista, numba; numba.core.config.reload_config(); print('as ever')"
     assert execute(trap, python_command("-c", again), "", **where).stdout == "as ever\n"
