@@ -18,8 +18,18 @@ The first of them compiles loops of a fluid, the next three those of bridges: tw
 """
 
 
+COMPILE_THEIR_OWN = (
+    "scenarios.collisions.wet_wall.study", "scenarios.collisions.wet_wall.study.sticking_velocity",
+    "scenarios.collisions.three_spheres.study",
+)  # fmt: skip
+"""Examples in docstrings that are slow tests: no plain test shares the loops that they compile, 20 s for each study."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest files first."""
+    """Put the longest files first, and mark examples that are slow."""
+    for item in items:
+        if item.name in COMPILE_THEIR_OWN:
+            item.add_marker(pytest.mark.slow)
     rank = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
 
@@ -33,6 +43,13 @@ def one_thread() -> Iterator[None]:
     use_threads(1)
     yield
     use_threads(before)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages are written without their pictures, which take seconds: for tests of the words on a page."""
+    for module in ("report_page", "comparison_page"):
+        monkeypatch.setattr(f"cfddem.plotting.{module}.encoded", lambda *_: "")
 
 
 @pytest.fixture(autouse=True)

@@ -226,6 +226,7 @@ def test_a_curve_over_velocity_is_compared_with_the_steps_of_the_inlet(tmp_path:
     assert one["points"] == 1 and one["outside"] == 2
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_the_page_shows_measured_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_up(tmp_path / "run")
     csv_file(tmp_path, "bed voidage [-]\n0.66\n")

@@ -32,6 +32,7 @@ def test_the_drift_is_that_of_the_rows_that_are_averaged(tmp_path: Path) -> None
     assert measure.drift == pytest.approx(-0.0394 * 0.04, rel=0.05)
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_an_error_that_is_a_lower_bound_is_marked_everywhere_and_judges_nothing(tmp_path: Path) -> None:
     """Two levels of a slow wave, whose block means are correlated up to an eighth of the record."""
     for name, level in (("a", 0.04), ("b", 0.05)):

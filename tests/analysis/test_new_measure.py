@@ -41,6 +41,7 @@ def mean_speed(simulation: Simulation) -> float:
     return float(np.linalg.norm(simulation.particles.velocity, axis=1).mean())
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_declared_function_appears_in_history_report_and_page(tmp_path: Path) -> None:
     measure("m/s")(mean_speed)
     run = Run.begin(Case.from_text(SHORT), tmp_path / "run")

@@ -48,6 +48,7 @@ def test_means_errors_and_laws_match_the_record(tmp_path: Path) -> None:
     assert result.steps == {"particles": 40_000, "fluid": 4000}
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_iterations_and_damping_number_of_films_are_those_of_the_window(tmp_path: Path) -> None:
     folder, without = made_up(tmp_path / "run"), made_up(tmp_path / "none", BED + 'lubrication = "none"')
     result, words = report(folder), "ilms solved together: 1.2 iterations a step, largest damping number X = 100"
@@ -115,6 +116,7 @@ def test_warnings_of_the_check_are_repeated_where_they_affect_the_answers(tmp_pa
     assert [each.split(":")[0] for each in said] == ["material.glass.contact_modulus"]  # not that of run.every
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_page_names_the_sources_of_the_laws_of_its_case(tmp_path: Path) -> None:
     cited = {each.name: each.reference for each in report(made_up(tmp_path / "run")).references}
     assert {"di_felice", "film_strength", "elastohydrodynamic", "hertz"} <= cited.keys() and "ergun" not in cited
@@ -122,6 +124,7 @@ def test_a_page_names_the_sources_of_the_laws_of_its_case(tmp_path: Path) -> Non
     assert "Di Felice, Int. J. Multiphase Flow 20 (1994) 153" in text
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_run_without_a_fluid_has_a_report(tmp_path: Path) -> None:
     dry = BED[: BED.index("[fluid]")] + BED[BED.index("[material") :].replace("inlet_velocity = 0.05\n", "")
     result = report(made_up(tmp_path / "run", dry))
@@ -191,6 +194,7 @@ until = 0.01
 """
 
 
+@pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize("density", [2500.0, 400.0])
 def test_a_single_sphere_is_compared_with_its_drag_law(tmp_path: Path, density: float) -> None:
     """Stokes drag from rest: u_t (1 - exp(-t/tau)), here with a speed 2 % too high from 4 ms on, up to a contact."""

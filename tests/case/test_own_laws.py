@@ -166,6 +166,7 @@ def test_a_package_that_could_not_be_loaded_is_named() -> None:
 # ---------------------------------------------------------------- finished runs
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_run_is_read_without_the_law_that_it_used(tmp_path: Path) -> None:
     text = BED.replace('agitation = "none"', 'drag = "narrow"\nagitation = "wild"')
     result = report(_with_case(made_up(tmp_path / "run"), text))

@@ -56,7 +56,7 @@ ALL_FORCES: dict[str, Any] = {
 
 BEDS = {
     "all forces": case_of(
-        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__history="mei_adrian", run__energy_budget=True,
+        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__history="mei_adrian",
         laws__agitation="pseudo_turbulence", **ALL_FORCES
     ),
     "crossing a periodic border": case_of(
@@ -65,6 +65,7 @@ BEDS = {
     ),
     "mixture, pieces of spheres": case_of(MIXTURE, column__cell=0.002, laws__mapping="divided"),
 }  # fmt: skip
+BEDS["all forces and their energy"] = BEDS["all forces"].with_(**{"run.energy_budget": True})
 
 
 def begun(case: Case, communicator: Communicator = SERIAL, state: dict[str, Any] | None = None) -> Simulation:
@@ -126,14 +127,26 @@ def assert_same_bits(found: dict[str, Array], alone: dict[str, Array]) -> None:
     assert found["energy"] == pytest.approx(alone["energy"], rel=1e-12)
 
 
-@pytest.mark.parametrize("shape", [(1, 2, 1), pytest.param((2, 2, 1), marks=pytest.mark.slow), (1, 2, 2)])
-@pytest.mark.parametrize("name", BEDS)
+PLAIN = {
+    "all forces": (1, 2, 1), "crossing a periodic border": (1, 2, 2), "mixture, pieces of spheres": (1, 2, 1)
+}  # fmt: skip
+"""The shape in which each bed is divided in a plain test; the slow ones take all shapes."""
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        pytest.param(name, shape, marks=[pytest.mark.slow] * (PLAIN.get(name) != shape))
+        for name in BEDS
+        for shape in ((1, 2, 1), (2, 2, 1), (1, 2, 2))
+    ],
+)
 def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
     """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders.
 
     With all forces the ranks run on all threads.
     """
-    steps, ranks, threads = 5, int(np.prod(shape)), None if name == "all forces" else 1
+    steps, ranks, threads = 5, int(np.prod(shape)), None if "all forces" in name else 1
 
     def program(communicator: Communicator) -> tuple[dict[str, Array], set[int]]:
         communicator.shape = shape

@@ -186,7 +186,7 @@ def test_a_sphere_lands_as_the_equation_of_motion_says(walls: Walls) -> None:
     assert gaps[-1] < 0.01 * RADIUS_OF_NYLON
 
 
-@pytest.mark.parametrize("slips", [False, True])
+@pytest.mark.parametrize("slips", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_shares_of_the_self_disturbance_beside_a_wall(slips: bool) -> None:
     """Steady flow at 4.5 cells from a wall by the images of Lorentz, or of a wall without friction, within 4 %."""
     cell, strength, sweeps = 2e-3, (0.01,) * 3, 7

@@ -29,7 +29,7 @@ def doublet(until: float = 30.0, **changes: Any) -> Case:
     """Two wet beads that touch, without weight, in hot dry air."""
     beads = [(0.2, 0.2, 0.2), (0.2 + DIAMETER - 1e-7, 0.2, 0.2)]
     glass = {"density": 2500.0, "youngs_modulus": 1e5, "poisson": 0.25, "friction": 0.3, "roughness": 1e-6}
-    liquid = {"viscosity": 1e-3, "surface_tension": 0.02, "thickness": 1e-6, "redistribution": "half"}
+    liquid = {"viscosity": 1e-3, "surface_tension": 0.02, "thickness": 1e-6, "pull": "pendular", "film": "deforming"}
     given = {
         "material": {"glass": glass}, "liquid": liquid, "evaporation__drops": [], "evaporation__rate": "stefan",
         "evaporation__vapour_fraction": 0.0, "bed__positions": beads, "bed__fixed": False, "fluid": HUMID,

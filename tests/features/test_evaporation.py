@@ -91,7 +91,7 @@ def test_a_checkpoint_continues_with_the_same_bits() -> None:
     assert np.array_equal(again.particles.radius, simulation.particles.radius)
 
 
-LIQUID = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 5e-6}
+LIQUID = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 5e-6, "pull": "pendular", "film": "deforming"}
 
 
 def wet_bead(**changes: Any) -> Case:

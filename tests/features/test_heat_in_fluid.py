@@ -155,7 +155,7 @@ def test_a_packed_bed_cools_as_schumann_solved_it() -> None:
     assert len(rows) == 3 and all(each.verdict == "holds" for each in rows), rows
 
 
-@pytest.mark.parametrize("box", [80e-6, 0.38e-3, 2e-3])
+@pytest.mark.parametrize("box", [80e-6, pytest.param(0.38e-3, marks=pytest.mark.slow), 2e-3])
 def test_tiny_hot_particles_and_gas_meet_at_the_common_temperature_with_steps_far_too_long(box: float) -> None:
     """Spheres of 20 um follow the gas in 3 ms; the capacity of the gas is 1/100 of theirs, the same, or 100 times it.
 

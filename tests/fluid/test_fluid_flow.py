@@ -88,11 +88,12 @@ def test_poiseuille_flow_in_a_square_duct():
     assert order(errors)[0] > 1.9
 
 
-def test_pipe_flow_in_a_masked_cylinder_converges():
+@pytest.mark.parametrize(("finest", "limit"), [(16, 0.07), pytest.param(32, 0.05, marks=pytest.mark.slow)])
+def test_pipe_flow_in_a_masked_cylinder_converges(finest: int, limit: float) -> None:
     """Hagen-Poiseuille flux as the staircase of the mask gets finer."""
-    errors = [abs(pipe(n) - 1.0) for n in (8, 16, 32)]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 0.05
+    errors = [abs(pipe(n) - 1.0) for n in (8, 16, 32) if n <= finest]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < limit
 
 
 def test_periodic_channel_flux_is_driven_backwards_by_a_negative_gradient():

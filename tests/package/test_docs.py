@@ -23,8 +23,8 @@ NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^\n]*?) -->\n)?```(?P<kind>python|sh)\n(?P<text>.*?)^```$", re.M | re.S)
 """A block to run. The comment before it: `not run`, `slow`, `exits N`, `needs LIBRARY`, `needs LIBRARY, slow`."""
 
-QUICK = ("wet_pair", "wet_wall")
-"""Scenarios whose pages take seconds; the others run whole beds, or maps."""
+QUICK = ("wet_pair",)
+"""Scenarios whose pages take seconds; the others run whole beds, or maps, or compile loops of their own."""
 
 
 class Block(NamedTuple):

@@ -45,7 +45,7 @@ QUANTITIES = {
 POINTS = np.random.default_rng(1).random((300, 3)) * [0.1, 0.04, 0.1]
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def renders() -> None:
     """Skip with the reason if this machine cannot render."""
     fault = rendering.why_not()
@@ -56,7 +56,12 @@ def renders() -> None:
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
     """A run that is still going, with three snapshots."""
-    folder = RunFolder.create(tmp_path / "bed", 'title = "small bed"\n', {}, GRID, QUANTITIES)
+    return written(tmp_path)
+
+
+def written(place: Path) -> RunFolder:
+    """A run in the folder `bed` of a place, still going, with three snapshots."""
+    folder = RunFolder.create(place / "bed", 'title = "small bed"\n', {}, GRID, QUANTITIES)
     for k in range(3):
         write(folder, k)
     return folder
@@ -177,16 +182,23 @@ def test_an_unknown_colour_is_refused(run: RunFolder) -> None:
         Viewer(run.folder, "liqid", name="unknown")
 
 
-@pytest.fixture
-def address(run: RunFolder, tmp_path: Path) -> Iterator[str]:
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    """The run that the command shows, still going."""
+    return written(tmp_path_factory.mktemp("served"))
+
+
+@pytest.fixture(scope="module")
+def address(served: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address that the command prints."""
     pytest.importorskip("trame", reason="needs `pip install 'cfddem[web]'`")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"} | {"PYTHONPATH": str(HOME)}
+    tmp_path = tmp_path_factory.mktemp("log")
     with open(tmp_path / "log", "w") as log:
-        line = [sys.executable, "-m", "cfddem", "view", str(run.folder), "--web", "--port", str(port)]
+        line = [sys.executable, "-m", "cfddem", "view", str(served.folder), "--web", "--port", str(port)]
         server = subprocess.Popen(line, stdout=log, stderr=log, env=environment)
     try:
         until(lambda: server.poll() is not None or "http" in (tmp_path / "log").read_text(), 60, "the server starts")
@@ -236,7 +248,13 @@ def test_a_report_fits_the_screen_of_a_phone(tmp_path: Path, chromium: Chromium)
     chromium.screenshot(tmp_path / "phone.png")
 
 
-def test_the_page_is_drawn_and_moves_through_time(address: str, run: RunFolder, chromium: Chromium) -> None:
+def test_the_page_needs_its_key(address: str, chromium: Chromium) -> None:
+    chromium.open(address.split("?")[0])
+    with pytest.raises(AssertionError):
+        chromium.wait("return document.getElementById('clock')?.textContent", 4.0)
+
+
+def test_the_page_is_drawn_and_moves_through_time(address: str, served: RunFolder, chromium: Chromium) -> None:
     chromium.open(address)
     clock = "return document.getElementById('clock')?.textContent.trim()"
     chromium.wait(f"{clock} == 'snapshot 2 of 2, t = 0.2 s'")
@@ -250,7 +268,7 @@ def test_the_page_is_drawn_and_moves_through_time(address: str, run: RunFolder, 
     assert chromium.script(mark) < at_end - 50
     chromium.keys("footer .v-slider-thumb", "\ue014")  # arrow to the right
     chromium.wait(f"{clock} == 'snapshot 2 of 2, t = 0.2 s'")
-    write(run, 3)
+    write(served, 3)
     chromium.wait(f"{clock} == 'snapshot 3 of 3, t = 0.3 s'")
     chromium.click("#play")  # at the end it begins again
     chromium.wait(f"{clock} != 'snapshot 3 of 3, t = 0.3 s'")
@@ -261,9 +279,3 @@ def test_the_page_is_drawn_and_moves_through_time(address: str, run: RunFolder, 
     assert not [
         each for each in chromium.complaints() if "/paraview/" not in each
     ]  # where the client first asks for a session
-
-
-def test_the_page_needs_its_key(address: str, chromium: Chromium) -> None:
-    chromium.open(address.split("?")[0])
-    with pytest.raises(AssertionError):
-        chromium.wait("return document.getElementById('clock')?.textContent", 4.0)

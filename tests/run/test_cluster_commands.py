@@ -56,15 +56,6 @@ run = {until = 0.01, every = 0.005, history_every = 0.002}
 """
 
 
-@pytest.fixture(scope="module")
-def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The case file, in a folder with a run of one process, `one`."""
-    folder = tmp_path_factory.mktemp("cluster")
-    (folder / "case.toml").write_text(TEXT)
-    assert cfddem("run", "case.toml", "-o", "one", folder=folder).returncode == 0
-    return folder / "case.toml"
-
-
 def particles(run: Path) -> dict[str, np.ndarray]:
     """The particles of the newest checkpoint, by id."""
     found = checkpoint.newest(run)["simulation"]["particles"]["particles"]
@@ -98,9 +89,11 @@ def assert_same_files(one: Path, other: Path) -> None:
 
 
 @pytest.mark.slow  # as plain tests: a bed on two ranks, and ranks in one process that go on with another number
-def test_files_of_ranks_are_those_of_one_process_and_any_number_goes_on(case: Path) -> None:
+def test_files_of_ranks_are_those_of_one_process_and_any_number_goes_on(tmp_path: Path) -> None:
     """Snapshots, recorded collisions, history, report; then two ranks, and one, go on from a checkpoint of three."""
-    home = case.parent
+    home = tmp_path
+    (home / "case.toml").write_text(TEXT)
+    assert cfddem("run", "case.toml", "-o", "one", folder=home).returncode == 0
     done = cfddem("run", "case.toml", "-o", "three", "--ranks", "3", folder=home)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("written to three") == 1 and "finished" in done.stdout
@@ -143,14 +136,14 @@ def test_a_bed_on_ranks_is_that_of_one_process(tmp_path: Path) -> None:
         assert moved.max() < 1e-7  # single precision
 
 
-def test_more_ranks_than_can_share_the_cells_are_refused(case: Path, tmp_path: Path) -> None:
+def test_more_ranks_than_can_share_the_cells_are_refused(tmp_path: Path) -> None:
     """Before anything runs, once, with exit code 2; and a number of ranks that the launcher has not started."""
     (tmp_path / "bed.toml").write_text(BED)
     done = cfddem("run", "bed.toml", "-o", "run", "--ranks", "3", folder=tmp_path)
     assert done.returncode == 2 and done.stderr.count("ranks = 3: must be at most 2 x 1 x 2 for 6 x 3 x 8 cells") == 1
     assert not (tmp_path / "run").exists()
     done = subprocess.run(
-        launch_command(2, [sys.executable, "-m", "cfddem", "run", str(case), "--ranks", "3"]),
+        launch_command(2, [sys.executable, "-m", "cfddem", "run", "bed.toml", "--ranks", "3"]),
         env=environment() | {"PYTHONPATH": str(HERE.parent)}, cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2 and "--ranks = 3: must be 2" in done.stderr

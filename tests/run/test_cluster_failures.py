@@ -97,11 +97,17 @@ CASES = {
 
 @pytest.fixture(scope="module", params=["beads", pytest.param("bed in water", marks=pytest.mark.slow)])
 def home(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a case and its run in one process, `one`."""
+    """A folder with a case."""
     folder = tmp_path_factory.mktemp("failures")
     (folder / "case.toml").write_text(CASES[request.param])
-    assert cfddem("run", "case.toml", "-o", "one", folder=folder).returncode == 0
     return folder
+
+
+@pytest.fixture(scope="module")
+def one(home: Path) -> Path:
+    """The run of the case in one process."""
+    assert cfddem("run", "case.toml", "-o", "one", folder=home).returncode == 0
+    return home / "one"
 
 
 def assert_whole(run: Path) -> None:
@@ -130,11 +136,22 @@ def assert_goes_on(run: Path, one: Path, ranks: int) -> None:
         ("message", 1, "cfddem: rank 1: ValueError: something unforeseen"),
         pytest.param("exit4", 3, "cfddem: rank 1: sys.exit(4) was called within the run", marks=pytest.mark.slow),
         pytest.param("exit0", 3, "rank 1: sys.exit(0) was called within the run", marks=pytest.mark.slow),
-        ("kill", 9, ""),
     ],
 )
 def test_one_rank_that_fails_ends_all(home: Path, tmp_path: Path, how: str, code: int, message: str) -> None:
-    """An exception in a step or within an exchange, sys.exit, SIGKILL: within 10 s, with its message and code."""
+    """An exception in a step or within an exchange, and sys.exit: within 10 s, with its message and code."""
+    fails(home, tmp_path, how, code, message)
+
+
+@pytest.mark.slow  # as plain tests: a killed rank, and one process that goes on from two
+def test_one_process_goes_on_where_a_rank_was_killed(home: Path, one: Path, tmp_path: Path) -> None:
+    """From a whole folder, to the end of one process."""
+    fails(home, tmp_path, "kill", 9, "")
+    assert_goes_on(tmp_path / "run", one, ranks=1)
+
+
+def fails(home: Path, tmp_path: Path, how: str, code: int, message: str) -> None:
+    """Make a rank fail: all end within 10 s with its message and code, and leave a whole folder."""
     (tmp_path / "failing.py").write_text(FAILING)
     program = [sys.executable, str(tmp_path / "failing.py"), how, str(tmp_path / "mark")]
     command = launch_command(2, [*program, "run", str(home / "case.toml"), "-o", str(tmp_path / "run")])
@@ -143,8 +160,6 @@ def test_one_rank_that_fails_ends_all(home: Path, tmp_path: Path, how: str, code
     assert took < LONGEST, f"the ranks ended after {took:.1f} s"
     assert done.returncode == code and message in done.stderr, done.stderr
     assert_whole(tmp_path / "run")
-    if how == "kill":
-        assert_goes_on(tmp_path / "run", home / "one", ranks=1)
 
 
 def test_one_rank_of_a_script_that_fails_ends_all(home: Path, tmp_path: Path) -> None:
@@ -200,9 +215,9 @@ def test_ranks_end_where_their_command_is_killed(home: Path, tmp_path: Path) -> 
         assert time.monotonic() < until
 
 
-def kill_all(home: Path, run: Path, kills: int, seed: int) -> None:
+def kill_all(one: Path, run: Path, kills: int, seed: int) -> None:
     """Kill the launcher and all ranks at random instants, look at the folder, go on, and look at the end."""
-    instants, ranks = random.Random(seed), 2
+    instants, ranks, home = random.Random(seed), 2, one.parent
     command = ["run", "case.toml", "-o", str(run)]
     for _ in range(kills):
         before = len(list((run / "data").glob("*.h5"))) if run.exists() else 0
@@ -225,7 +240,7 @@ def kill_all(home: Path, run: Path, kills: int, seed: int) -> None:
             assert time.monotonic() < until + LONGEST
         assert_whole(run)
         command, ranks = ["resume", str(run)], 5 - ranks
-    assert_goes_on(run, home / "one", ranks=2)
+    assert_goes_on(run, one, ranks=2)
 
 
 def other_ranks(run: Path) -> list[str]:
@@ -235,15 +250,15 @@ def other_ranks(run: Path) -> list[str]:
 
 
 @pytest.mark.slow  # as a plain test: one rank that is killed
-def test_killed_ranks_leave_a_whole_folder_that_goes_on(home: Path, tmp_path: Path) -> None:
+def test_killed_ranks_leave_a_whole_folder_that_goes_on(one: Path, tmp_path: Path) -> None:
     """Twice, going on with another number of ranks; the end is that of one process."""
-    kill_all(home, tmp_path / "run", kills=2, seed=1)
+    kill_all(one, tmp_path / "run", kills=2, seed=1)
 
 
 @pytest.mark.slow
-def test_many_kills_leave_a_whole_folder_that_goes_on(home: Path, tmp_path: Path) -> None:
+def test_many_kills_leave_a_whole_folder_that_goes_on(one: Path, tmp_path: Path) -> None:
     """Ten times."""
-    kill_all(home, tmp_path / "run", kills=10, seed=2)
+    kill_all(one, tmp_path / "run", kills=10, seed=2)
 
 
 def _can_mount() -> bool:
@@ -255,7 +270,7 @@ def _can_mount() -> bool:
 @pytest.mark.slow  # as plain tests: a full disk in one process, and ranks of which one fails
 @pytest.mark.skipif(not _can_mount(), reason="a small disk cannot be mounted here")
 @pytest.mark.parametrize("room", ["400k", "100k"])
-def test_a_full_disk_ends_all_ranks_and_leaves_a_whole_folder(home: Path, tmp_path: Path, room: str) -> None:
+def test_a_full_disk_ends_all_ranks_and_leaves_a_whole_folder(home: Path, one: Path, tmp_path: Path, room: str) -> None:
     """Rank 0 writes; on a larger disk the run goes on to the end of one process."""
     shutil.copy(home / "case.toml", tmp_path)
     (tmp_path / "disk").mkdir()
@@ -269,8 +284,8 @@ def test_a_full_disk_ends_all_ranks_and_leaves_a_whole_folder(home: Path, tmp_pa
     assert "rank 0" in done.stderr and "no space left on device; free space on that disk" in done.stderr
     assert ".partial" not in (tmp_path / "left").read_text()
     assert_whole(tmp_path / "run")
-    assert_same_particles(home / "one", tmp_path / "run")
-    assert_same_files(home / "one", tmp_path / "run")
+    assert_same_particles(one, tmp_path / "run")
+    assert_same_files(one, tmp_path / "run")
 
 
 def test_a_scheduler_stops_all_ranks_with_a_checkpoint(home: Path, tmp_path: Path) -> None:

@@ -48,6 +48,8 @@ WET = """
 [liquid]
 viscosity = 5e-3
 surface_tension = 0.02
+pull = "pendular"
+film = "deforming"
 liquid_fraction = 0.002
 [spray]
 rate = 1e-7
@@ -128,7 +130,7 @@ def in_one_process(name: str) -> tuple[dict[str, np.ndarray], dict[str, float]]:
 
 @pytest.mark.parametrize(
     ("name", "ranks"),
-    [(name, 2) for name in FEW]
+    [pytest.param(name, 2, marks=[pytest.mark.slow] * ("fluctuating" in name)) for name in FEW]
     + [pytest.param(name, 3, marks=[pytest.mark.slow] * ("mixture" not in name)) for name in FEW],
 )
 def test_ranks_without_a_particle_share_a_case(name: str, ranks: int) -> None:

@@ -205,7 +205,12 @@ def test_unlike_bodies_take_the_mean_roughness_and_share_momentum() -> None:
 
 
 @pytest.mark.parametrize(
-    ("material", "stokes"), [(DELRIN, 20.0), (DELRIN, 100.0), (MATERIALS["steel_rough"], 30.0), (GLASS, 200.0)]
+    ("material", "stokes"),
+    [
+        (DELRIN, 20.0),
+        (DELRIN, 100.0),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in ((MATERIALS["steel_rough"], 30.0), (GLASS, 200.0))),
+    ],
 )
 def test_plain_verlet_is_within_its_limit_where_it_resolves_the_film(material: Material, stokes: float) -> None:
     exact = collide(material, velocity=0.02, stokes=stokes, step_fraction=5e-4)

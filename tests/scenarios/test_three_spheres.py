@@ -211,8 +211,9 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: float) -> None:
         hard_spheres(**{"stokes": 5.0, "theta12": 30.0, name: value})  # type: ignore[arg-type]
 
 
-def test_the_command_prints_json() -> None:
-    result = parsed(call("three-spheres", "--stokes", "20", "--theta12", "30", "--json").out)
+@pytest.mark.parametrize("solver", ["equations", pytest.param("particles", marks=pytest.mark.slow)])
+def test_the_command_prints_json(solver: str) -> None:
+    result = parsed(call("three-spheres", "--stokes", "20", "--theta12", "30", "--solver", solver, "--json").out)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
     words = call("three-spheres", "--stokes", "20", "--theta12", "30", "--solver", "equations").out

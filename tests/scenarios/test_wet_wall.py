@@ -250,15 +250,17 @@ def test_sliding_and_spin_in_the_film_are_reciprocal() -> None:
         assert 6.0 * layer.spin_force(ratio) == pytest.approx(8.0 * layer.sliding_torque(ratio), abs=1e-3)
 
 
-def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("solver", ["equations", pytest.param("particles", marks=pytest.mark.slow)])
+def test_the_command_prints_the_result_and_refuses_by_name(solver: str, capsys: pytest.CaptureFixture[str]) -> None:
     from cfddem.cli.app import app
 
     def say(*words: str) -> str:
-        app(["wet-wall", *words], result_action="return_value")
+        app(["wet-wall", *words, "--solver", solver], result_action="return_value")
         return str(capsys.readouterr().out)
 
     printed = parsed(say("--film", "2e-4", "--velocity", "0.6", "--json"))
-    assert printed["restitution"] == pytest.approx(impact(film=200e-6, velocity=0.6).restitution, abs=1e-9)
+    found = impact(film=200e-6, velocity=0.6, solver=solver)
+    assert printed["restitution"] == pytest.approx(found.restitution, abs=1e-9)
     assert printed["restitution_tangential"] is None
     assert "contact_lost" in say()
     with pytest.raises(InputError, match="half_filling_angle"):
