@@ -134,7 +134,7 @@ def test_contacts_at_rest_carry_the_weight() -> None:
 
 
 def test_stability_of_a_case_is_shown(tmp_path: Path) -> None:
-    """Alumina of 3.087 mm in water breaks up into waves of 33 mm; agitation lowers their growth."""
+    """Alumina of 3.087 mm in water breaks up into waves of 31 mm; agitation lowers their growth."""
     case = tmp_path / "alumina.toml"
     case.write_text(TEXT)
     done = call("stability", str(case), "--plot", str(tmp_path / "growth.png"))
