@@ -49,8 +49,7 @@ def test_many_ranks_have_the_bits_of_one(kind: str, ranks: int) -> None:
     assert_same_bits(found, alone(kind, 10_000, 500))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("without", ["film", "memory"])
+@pytest.mark.parametrize("without", [pytest.param("film", marks=pytest.mark.slow), "memory"])
 def test_an_exchange_that_is_left_out_is_noticed(without: str) -> None:
     """Velocities between kick and film impulses; memories of pairs that change rank."""
     kind = "film" if without == "film" else "dry"
