@@ -199,7 +199,7 @@ def _headline(result: Report) -> Iterator[str]:
     reason = f", {result.message}" if result.status == "finished" and result.message else ""
     yield f"{result.case}: {result.status}{reason}"
     parts = window(result).replace(" ", NO_BREAK).replace(f";{NO_BREAK}", "; ")  # a line ends between two parts
-    for line in textwrap.wrap(parts, line_width() - 2, subsequent_indent="  "):
+    for line in textwrap.wrap(parts, line_width() - 2, subsequent_indent="  ", break_long_words=False):
         yield line.replace(NO_BREAK, " ")
     yield from bounds_note(result)
 
@@ -211,7 +211,9 @@ def _key_results(results: Sequence[KeyResult]) -> Iterator[str]:
         if isinstance(key_result.value, str) and len(opening) > wide + 20:
             yield opening.rstrip()
             opening = " " * (wide + 20)
-        wrapped = textwrap.wrap(opening + key_result.verdict, line_width() - 2, subsequent_indent=" " * (wide + 20))
+        wrapped = textwrap.wrap(
+            opening + key_result.verdict, line_width() - 2, subsequent_indent=" " * (wide + 20), break_long_words=False
+        )
         yield from wrapped or [opening]
 
 

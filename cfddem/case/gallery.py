@@ -39,10 +39,10 @@ def copy_from_gallery(name: str, output: Path | None = None) -> Path:
     output   file to write; default: NAME.toml in the working directory
     returns  the file
     """
-    files = gallery_files()
-    if name.replace("_", "-") not in files:
-        raise InputError("name", name, nearest(name, files), "cfddem new lists the gallery")
-    source = files[name.replace("_", "-")]
+    of_gallery = gallery_files()
+    if name.replace("_", "-") not in of_gallery:
+        raise InputError("name", name, nearest(name, of_gallery), "cfddem new lists the gallery")
+    source = of_gallery[name.replace("_", "-")]
     output = output or Path(f"{source.parent.name}.toml")
     try:
         with output.open("x", encoding="utf-8") as file:
@@ -67,10 +67,10 @@ def find_case(name: Path | None) -> Path:
         return here[0]
     if name.is_file():
         return name
-    files = gallery_files()
-    if str(name) in files:
-        return files[str(name)]
-    raise InputError("case", str(name), f"a file, or {nearest(str(name), files)}")
+    of_gallery = gallery_files()
+    if str(name) in of_gallery:
+        return of_gallery[str(name)]
+    raise InputError("case", str(name), f"a file, or {nearest(str(name), of_gallery)}")
 
 
 def overrides(texts: Sequence[str]) -> dict[str, Any]:

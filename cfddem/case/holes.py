@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError, shown
 
-SAMPLES = 24
-"""Places across a hole at which it is sampled."""
+SAMPLES, OF_A_CELL = 24, 12
+"""Fewest places across a hole, and across a cell, at which a hole is sampled."""
 
 Array = NDArray[np.float64]
 
@@ -33,16 +33,37 @@ def in_rows(number: int, pitch: float) -> Array:
     return np.asarray(pitch * np.stack([x, y], axis=-1)[nearest])
 
 
-def samples(places: Array, diameter: float) -> tuple[Array, Array]:
+def samples(places: Array, diameter: float, spacing: tuple[float, float] | None = None) -> tuple[Array, Array]:
     """x and y of places spread evenly over the holes (M,) [m].
 
     places    of their centres (N, 2) [m]
     diameter  of each [m]
+    spacing   of the places along x and y; default: for SAMPLES across a hole [m]
     """
-    line = ((np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5) * diameter
-    x, y = (offsets.ravel() for offsets in np.meshgrid(line, line))
+    lines = []
+    for apart in spacing or 2 * (diameter / SAMPLES,):
+        reach = math.ceil(0.5 * diameter / apart)
+        lines.append((np.arange(-reach, reach) + 0.5) * apart)
+    x, y = (offsets.ravel() for offsets in np.meshgrid(*lines))
     within = np.hypot(x, y) <= 0.5 * diameter
     return (places[:, :1] + x[within]).ravel(), (places[:, 1:] + y[within]).ravel()
+
+
+def samples_by_cells(places: Array, diameter: float, cell: tuple[float, float]) -> tuple[Array, Array]:
+    """The same, with equally many places in every cell that a hole covers, so that it gets the velocity of the hole.
+
+    The holes move onto the lattice of places, by less than 1/24 of a cell and 1/48 of their diameter along x and y.
+
+    cell  edges along x and y of cells that begin at the origin [m]
+
+    >>> x, y = samples_by_cells(np.array([[0.05, 0.05]]), 0.1, (0.01, 0.01))
+    >>> middle = np.histogram2d(x, y, 10, [(0.0, 0.1)] * 2)[0][3:7, 3:7]
+    >>> middle.min(), middle.max()
+    (144.0, 144.0)
+    """
+    even = [2 * math.ceil(0.5 * max(OF_A_CELL, SAMPLES * edge / diameter)) for edge in cell]
+    spacing = cell[0] / even[0], cell[1] / even[1]
+    return samples(np.round(places / spacing) * spacing, diameter, spacing)
 
 
 def refuse_holes(patch: Any) -> None:
@@ -55,9 +76,9 @@ def refuse_holes(patch: Any) -> None:
         limit = "floor or lid" if patch.brings else "that of an inlet by velocity or mass_flow"
         raise InputError(key, value, limit, 'holes are for a distributor plate; take shape = "disc" here')
     if isinstance(patch.holes, int):
-        if patch.pitch is None:
+        if patch.holes > 1 and patch.pitch is None:
             raise InputError("pitch", None, "given for a number of holes", "or list the places [x, y] of holes, in m")
-        closest, key = patch.pitch, "pitch"
+        closest, key = patch.pitch if patch.holes > 1 else math.inf, "pitch"
     else:
         for name in ("pitch", "centre"):
             if getattr(patch, name) is not None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
-from cfddem.case.holes import samples
+from cfddem.case.holes import samples_by_cells
 from cfddem.case.patches import ENDS, PLANES, CasePatch, along, lengths_of, middle_of, on_the_side, open_area_of
 from cfddem.case.tables import CaseTables
 from cfddem.fluid.cut_cells import section
@@ -110,7 +110,8 @@ def coverage(case: CaseTables, patch: CasePatch) -> Array:
 
 def _through_holes(case: CaseTables, patch: CasePatch) -> Array:
     """The same of holes, which may be smaller than a face: by places in each of them."""
-    x, y = samples(patch.places(middle_of(case, patch.side)), patch.diameter or 0.0)
+    cell = grid_of(case).spacing
+    x, y = samples_by_cells(patch.places(middle_of(case, patch.side)), patch.diameter or 0.0, (cell[0], cell[1]))
     part, inside = patch.area / len(x), on_the_side(case, patch.side, x, y)
     free = _apertures(case, patch.side) * grid_of(case).face_area(PLANES[patch.side][0])
     area = np.zeros(free.shape)

@@ -21,6 +21,7 @@ PLACES = 120
 Array = NDArray[np.float64]
 Place = tuple[float, float]
 Count = Annotated[int, Field(ge=1, le=10000)]
+Places = Annotated[tuple[Place, ...], Field(min_length=1)]
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "whole": (),
@@ -68,10 +69,10 @@ class CasePatch(Checked):
     diameter: Positive | None = Field(None, description="diameter of a disc or a hole, or outer one of a ring [m]")
     inner_diameter: Positive | None = Field(None, description="inner diameter of a ring [m]")
     size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, along the axes of centre [m]")
-    holes: Count | tuple[Place, ...] | None = Field(
+    holes: Count | Places | None = Field(
         None, description="number of holes, in rows at 60 degrees around centre, or the place (x, y) of each [-, m]"
     )
-    pitch: Positive | None = Field(None, description="distance of neighbouring holes, for a number of them [m]")
+    pitch: Positive | None = Field(None, description="distance of neighbouring holes, for more than one by number [m]")
     velocity: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
         None, description="superficial velocity of an inlet, into the column: a number, or [time, velocity] pairs [m/s]"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -310,7 +311,8 @@ def resume(
 
     folder = folder or newest_run(Path())
     if set:
-        remedy = f"to go on with another value: cfddem run --from {folder} --set {set[0]} -o NEW"
+        values = shlex.join(word for value in set for word in ("--set", value))
+        remedy = f"to go on with another value: cfddem run --from {folder} {values} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
     communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
     for file in laws or []:

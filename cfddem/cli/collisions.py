@@ -35,10 +35,10 @@ def _collide(
     own, other = arguments.pop("diameter"), arguments.pop("target_diameter")
     diameters = own, own if other is None else other
     numbers = None if stokes is None else stokes_numbers(stokes)
-    for name in (material, target):
+    for key, name in (("material", material), ("target", target)):
         if name is not None and name not in materials:
             remedy = "for another solid, call collide(Material(...), ...) in Python, as in the README"
-            raise InputError("material", name, nearest(name, materials), remedy)
+            raise InputError(key, name, nearest(name, materials), remedy)
     pair = materials[material], materials[target or material]
     if roughness is not None:
         rough = [Material(**material_of_sphere.model_dump() | {"roughness": roughness}) for material_of_sphere in pair]

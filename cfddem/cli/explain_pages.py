@@ -94,7 +94,8 @@ def find(name: str) -> Law:
     every = [law for those in laws().values() for law in those.values()]
     matching_laws = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not matching_laws:
-        closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
+        authors = sorted({author.lower() for law in every for author in re.findall(r"[^\W\d_]{4,}", law.reference)})
+        closest = _closest(word, [law.name for law in every]) or _closest(name, every_key()) or _closest(name, authors)
         raise InputError("law", name, f"a name listed by `cfddem explain`{closest}", absent(name))
     if len(matching_laws) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in matching_laws)}")

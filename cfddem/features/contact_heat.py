@@ -135,15 +135,15 @@ class HeatExchangeOfContacts(CaseFeature):
         around = self._surroundings(simulation)
         emissivity: Any = self.emissivities[particles.material]
         radiation = area * radiation_coefficient(emissivity, start, around)  # type: ignore[arg-type]  # of every particle
-        temperatures = np.array([wall.fixed for wall in self.walls])
-        powered = np.array([wall.is_powered for wall in self.walls], bool)
+        temperatures = np.array([of_wall.fixed for of_wall in self.walls])
+        powered = np.array([of_wall.is_powered for of_wall in self.walls], bool)
 
         # walls of a temperature stand on the right; a wall with a power is an unknown without capacity
         fixed, free = ~powered[wall], powered[wall]
         diagonal, right = capacity / step + radiation, capacity / step * start + radiation * around
         np.add.at(diagonal, body[fixed], at_wall[fixed])
         np.add.at(right, body[fixed], at_wall[fixed] * temperatures[wall[fixed]])
-        power = np.array([wall.power for wall in self.walls if wall.is_powered], float)  # type: ignore[type-var]
+        power = np.array([of_wall.power for of_wall in self.walls if of_wall.is_powered], float)  # type: ignore[type-var]
         node = (np.cumsum(powered) - 1)[wall[free]]  # local: walls
         network = Network(solver, diagonal, pairs, (body[free], node, at_wall[free]), len(power))
         new, of_walls = network.solved(np.append(right, power), start)
@@ -181,7 +181,7 @@ class HeatExchangeOfContacts(CaseFeature):
         order = np.lexsort((gap[pairs:], wall, body))
         fresh = np.ones(len(order), bool)
         fresh[1:] = (np.diff(body[order]) != 0) | (np.diff(wall[order]) != 0)
-        heated = np.array([wall.passes_heat for wall in self.walls], bool)
+        heated = np.array([of_wall.passes_heat for of_wall in self.walls], bool)
         rows = order[fresh]
         rows = rows[heated[wall[rows]] & (body[rows] < particles.owned)]
         body, wall, gap, force = body[rows], wall[rows], gap[pairs:][rows], force[pairs:][rows]
@@ -190,7 +190,7 @@ class HeatExchangeOfContacts(CaseFeature):
             particles, particles.material[body], walls.material[piece[rows]],
             (radius, np.full(len(rows), np.inf), gap, force), solver,
         )  # fmt: skip
-        coefficient = np.array([wall.coefficient or 0.0 for wall in self.walls])[wall]
+        coefficient = np.array([of_wall.coefficient or 0.0 for of_wall in self.walls])[wall]
         touches = np.where(gap < keys.lens * radius, coefficient * np.pi * radius**2, 0.0)
         at_wall = np.where(coefficient > 0.0, touches, at_wall)
         there = at_wall > 0.0

@@ -91,10 +91,11 @@ class Evaporation(FeatureTable):
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         self._refuse_humidity(case)
-        gases = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
+        gases: dict[str, float | None] = {"fluid_temperature": heat.fluid_temperature}
+        gases |= {"inlet_temperature": heat.gas_temperature, "outlet_temperature": heat.outlet_temperature}
         gases |= {f"patch_temperature.{name}": value for name, value in heat.patch_temperature.items()}
         for where, temperature in gases.items():
-            if not COLDEST <= temperature <= HOTTEST:
+            if temperature is not None and not COLDEST <= temperature <= HOTTEST:
                 limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
                 raise InputError(f"heat.{where}", temperature, limit, "the laws are those of water")
         for name in self.drops:
@@ -111,24 +112,39 @@ class Evaporation(FeatureTable):
                 remedy = "cells do not take the vapour of walls"
                 raise InputError("evaporation.wall_coefficient", self.wall_coefficient, "0 with [vapour]", remedy)
         vapour, key = VapourTable.of(case), "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
-        key = "vapour.inlet_fraction" if vapour else f"evaporation.{key}"
+        if vapour:
+            key = f"vapour.{'fluid' if vapour.inlet_fraction is None else 'inlet'}_fraction"
+        else:
+            key = f"evaporation.{key}"
         value = vapour.inflow if vapour else given_or(self.relative_humidity, self.vapour_fraction or 0.0)
         self._refuse_saturated(key, value, heat.gas_temperature, self.partial_pressure(case))
         if vapour:
-            of_air = {"vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature)}
-            for name in vapour.patch_fraction.keys() | heat.patch_temperature.keys():
-                warmth = heat.patch_temperature.get(name, heat.gas_temperature)
-                of_air[f"vapour.patch_fraction.{name}"] = vapour.patch_fraction.get(name, vapour.inflow), warmth
-            for where, (fraction, temperature) in sorted(of_air.items()):
-                self._refuse_saturated(where, fraction, temperature, vapour_pressure(fraction, self.pressure))
+            of_air: dict[str, tuple[float | None, float | None]] = {
+                "vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature),
+                "vapour.outlet_fraction": (vapour.outlet_fraction, heat.outlet_temperature),
+            }
+            for name, fraction in vapour.patch_fraction.items():
+                of_patch = heat.patch_temperature.get(name, heat.gas_temperature)
+                of_air[f"vapour.patch_fraction.{name}"] = fraction, of_patch
+            for where, (share, warmth) in sorted(of_air.items()):
+                if share is not None and warmth is not None:  # others are those of the cell
+                    self._refuse_saturated(where, share, warmth, vapour_pressure(share, self.pressure))
+            for name in sorted(heat.patch_temperature.keys() - vapour.patch_fraction.keys()):
+                temperature, where = heat.patch_temperature[name], f"heat.patch_temperature.{name}"
+                partial = vapour_pressure(vapour.inflow, self.pressure)
+                self._refuse_saturated(where, temperature, temperature, partial, f"{key} = {vapour.inflow:g}, but ")
 
-    def _refuse_saturated(self, key: str, value: float, temperature: float, partial: float) -> None:
-        """Refuse air above saturation, with a partial pressure of the vapour [Pa]."""
+    def _refuse_saturated(self, key: str, value: float, temperature: float, partial: float, brought: str = "") -> None:
+        """Refuse air above saturation, with a partial pressure of the vapour [Pa].
+
+        brought  key and value of the fraction, where the key that is named is that of the temperature
+        """
         saturated = saturation_pressure(temperature)
         if partial > SATURATED * saturated:
             most = vapour_fraction(min(saturated, self.pressure), self.pressure)
-            remedy = f"the mass fraction of saturation at {temperature:g} K is {most:.4g}"
-            raise InputError(key, value, "at most saturated", remedy)
+            remedy = f"{brought}the mass fraction of saturation at {temperature:g} K is {most:.4g}"
+            limit = "that of air at most saturated" if brought else "at most saturated"
+            raise InputError(key, value, limit, remedy)
 
     def _refuse_humidity(self, case: Any) -> None:
         """Refuse two humidities, or none; with `[vapour]` the humidity is that of the cells."""

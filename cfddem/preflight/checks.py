@@ -92,9 +92,10 @@ def find_issues(
         issues += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
         issues += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
         issues += check_expansion(case, bed)
-    elif case.bed.fastest_inflow > 0.0:
-        fault = "unused, because the case has no table [fluid]"
-        issues.append(Issue("warning", "bed.inlet_velocity", fault, "add that table, or leave the velocity out"))
+    elif (value := case.bed.fastest_inflow) > 0.0:  # patches are refused without a fluid
+        key = "bed.jet.velocity" if value > case.bed.highest_inlet_velocity else "bed.inlet_velocity"
+        fault = f"{value:g} m/s is unused, because the case has no table [fluid]"
+        issues.append(Issue("warning", key, fault, "add that table, or leave the velocity out"))
     issues.sort(key=lambda issue: ORDER.index(issue.severity))
     return [*check_length(case, refused=any(issue.severity == "error" for issue in issues)), *issues]
 

@@ -43,7 +43,9 @@ class Row:
     def lines(self) -> list[str]:
         """The number as text, at most 100 columns wide; a long note goes on below."""
         opening = f"  {self.name:<34} {_number(self.value):>10} {self.unit:<5} "
-        return textwrap.wrap(opening + self.note, line_width(), subsequent_indent=" " * len(opening))
+        return textwrap.wrap(
+            opening + self.note, line_width(), subsequent_indent=" " * len(opening), break_long_words=False
+        )
 
 
 def overview(

@@ -101,8 +101,8 @@ def forget(name: str) -> None:
 def all_columns(case: Case) -> dict[str, Quantity]:
     """Unit and meaning of every column of the history of a case."""
     columns = {"time": TIME}
-    for measure in MEASURES.values():
-        columns |= measure.columns(case)
+    for declared in MEASURES.values():
+        columns |= declared.columns(case)
     return columns
 
 
@@ -113,8 +113,8 @@ def units_of(case: Case) -> dict[str, str]:
 
 def require_shared(case: Case, ranks: int) -> None:
     """Refuse measures of a user that do not say that they are right on several ranks."""
-    for name, measure in MEASURES.items():
-        if ranks > 1 and name not in _BUILT_IN and not measure.shared and measure.columns(case):
+    for name, declared in MEASURES.items():
+        if ranks > 1 and name not in _BUILT_IN and not declared.shared and declared.columns(case):
             remedy = "declare it with @measure(unit, shared=True) if it is"
             raise InputError("measure", name, "right on several ranks", remedy)
 
@@ -122,16 +122,16 @@ def require_shared(case: Case, ranks: int) -> None:
 def row(simulation: Simulation) -> dict[str, float]:
     """One row of the history: the time, and every measure of the present state."""
     values = {"time": simulation.time}
-    for measure in MEASURES.values():
-        if measure.columns(simulation.case):
-            values |= measure.values(simulation)
+    for declared in MEASURES.values():
+        if declared.columns(simulation.case):
+            values |= declared.values(simulation)
     return values
 
 
-def _declare(name: str, measure: Measure) -> None:
+def _declare(name: str, declared: Measure) -> None:
     if name in _BUILT_IN:
         raise InputError("measure", name, "a new name", "a built-in measure has this name")
-    MEASURES[name] = measure
+    MEASURES[name] = declared
 
 
 # ---------------------------------------------------------------- kinds of cases

@@ -93,17 +93,17 @@ class Calibration:
 
     def estimates(self) -> list[dict[str, Any]]:
         """Best value, standard error and verdict of each key, as plain values."""
-        if (response := self.response) is None:
+        if (fit := self.response) is None:
             return []
         rows, agrees = [], self._agrees()[0]
         for place, variable in enumerate(self.variables):
-            share, error = float(response.best[place]), float(response.error[place])
+            share, error = float(fit.best[place]), float(fit.error[place])
             low, high = (variable.value(min(max(end, 0.0), 1.0)) for end in (share - error, share + error))
             tied = [
                 f"{self.variables[b if a == place else a].key} ({r:+.2f})"
-                for a, b, r in response.tied() if place in (a, b)
+                for a, b, r in fit.tied() if place in (a, b)
             ]  # fmt: skip
-            identified = bool(response.identified[place])
+            identified = bool(fit.identified[place])
             rows.append({
                 "key": variable.key, "value": variable.value(share), "error": 0.5 * (high - low) if variable.logarithmic
                 else error * (variable.high - variable.low), "low": variable.low, "high": variable.high,
@@ -248,9 +248,9 @@ class _Search:
         """Fix the values of the trial at a place: a sample first, then each second one at the best of the fit."""
         if place < len(self.first):
             shares = self.first[place]
-        elif place % 2 and (response := response_of(self.varied, self.data, self.done)) is not None:
-            spread = np.random.default_rng(place).normal(size=len(response.best))
-            shares = (response.best + 0.5 * response.error * spread).clip(0.0, 1.0)
+        elif place % 2 and (fit := response_of(self.varied, self.data, self.done)) is not None:
+            spread = np.random.default_rng(place).normal(size=len(fit.best))
+            shares = (fit.best + 0.5 * fit.error * spread).clip(0.0, 1.0)
         else:
             return
         self.study.enqueue_trial({variable.key: variable.value(share) for variable, share in zip(self.varied, shares)})

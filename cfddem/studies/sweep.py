@@ -203,7 +203,14 @@ def cases_of(path: Path, over: Over, overrides: Mapping[str, Any]) -> dict[str, 
     """Case and changed values of every run, by its name."""
     runs: dict[str, tuple[Case, dict[str, Any]]] = {}
     for values in _sets(over):
-        case, name = Case.from_toml(path, {**overrides, **values}), run_name(values)
+        try:
+            case, name = Case.from_toml(path, {**overrides, **values}), run_name(values)
+        except InputError as failure:
+            key = failure.field.removeprefix("--set ")
+            if key == failure.field or not any(f"{key}.".startswith(f"{varied}.") for varied in values):
+                raise
+            option = "--over" if isinstance(over, Mapping) else "--vary"
+            raise InputError(f"{option} {key}", failure.value, failure.limit, failure.remedy) from None
         if name in runs:
             raise InputError("--over", name, "a different name for every run", "a value is given twice")
         runs[name] = case, values

@@ -309,7 +309,8 @@ PLATE: dict[str, Any] = {"kind": "inlet", "shape": "holes", "diameter": 3e-3, "v
     ("holes", "number"),
     [
         ({"holes": 19, "pitch": 0.011}, 19),
-        ({"holes": 1, "pitch": 0.011, "centre": [0.071, 0.083]}, 1),
+        ({"holes": 1, "centre": [0.071, 0.083]}, 1),
+        ({"holes": 1, "pitch": 1e-3, "centre": [0.071, 0.083]}, 1),
         ({"holes": [[0.062, 0.081], [0.0801, 0.09], [0.1, 0.0703]]}, 3),
         ({"holes": 61, "pitch": 3e-3}, 61),
     ],
@@ -353,6 +354,20 @@ def test_holes_lie_in_rows_about_the_centre_and_only_faces_above_them_have_a_flo
     assert not case.patch["plate"].holds(x, y, (0.08, 0.08), 0.6e-3).any()
 
 
+@pytest.mark.parametrize("centre", [(0.08, 0.08), (0.0813, 0.0777)])
+@pytest.mark.parametrize("across", [3.3, 10.0, 10.3])
+def test_one_hole_many_cells_wide_has_the_velocities_of_a_disc(centre, across):
+    """Each face within the edge has the velocity of the patch, within the correction to the exact area."""
+    given = {"diameter": across * 5e-3, "centre": centre, "velocity": 20.0}
+    hole, disc = (
+        faces_of(made(vessel=None, column__cell=5e-3, patch={"plate": {"kind": "inlet"} | given | shape}))
+        for shape in ({"shape": "holes", "holes": 1}, {"shape": "disc"})
+    )
+    assert (disc == 20.0).sum() >= 0.25 * across**2 and hole.shape == disc.shape == (32, 32)
+    assert hole[disc == 20.0] == pytest.approx(20.0, rel=0.01)
+    assert hole == pytest.approx(disc, abs=0.1 * 20.0)  # the edge cuts faces
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -361,6 +376,7 @@ def test_holes_lie_in_rows_about_the_centre_and_only_faces_above_them_have_a_flo
         ({"holes": [[0.08, 0.08], [0.082, 0.08]]}, "patch.plate.holes.*the nearest two are 0.002 m apart"),
         ({"holes": [[0.08, 0.08]], "pitch": 0.01}, "patch.plate.pitch = 0.01: must be left out where holes are listed"),
         ({"holes": 0, "pitch": 0.01}, "patch.plate.holes"),
+        ({"holes": []}, "patch.plate.holes"),
         ({"pitch": 0.01}, "patch.plate.holes: must be given"),
         ({"holes": 7, "pitch": 0.01, "velocity": None, "pressure": 5.0}, "patch.plate.shape.*by velocity or mass_flow"),
         ({"holes": 7, "pitch": 0.01, "kind": "outlet", "velocity": None}, "patch.plate.shape.*by velocity"),

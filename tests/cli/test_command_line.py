@@ -26,7 +26,7 @@ from cfddem.cli.app import main
         ("collide --stokes 30 --velocity nan", ["velocity", "nan", "finite"]),
         ("collide --stokes inf --velocity 0.1", ["stokes", "inf", "finite"]),
         ("collide --stokes 30 --velocity 0.1 --material wood", ["material", "wood", "delrin"]),
-        ("collide --stokes 30 --velocity 0.1 --target oak", ["material", "oak", "delrin"]),
+        ("collide --stokes 30 --velocity 0.1 --target oak", ["target = ", "oak", "delrin"]),
         (
             "collide --stokes 30 --velocity 0.1 --viscosity 0.001",
             ["velocity", "viscosity", "stokes", "two of the three"],
@@ -40,6 +40,9 @@ from cfddem.cli.app import main
         ("collid --stokes 30", ["collid"]),
         ("check liquid-bed --set roughness=1e-6", ["roughness", "material.NAME.roughness"]),
         ("check liquid-bed --set inlet_velocity=-0.1", ["bed.inlet_velocity = -0.1", "at least 0"]),
+        ("sweep liquid-bed --over inlet_velocity=0.02,-0.1", ["--over bed.inlet_velocity = -0.1", "at least 0"]),
+        ("sweep liquid-bed --over seed=1..2 --set inlet_velocity=-0.1", ["--set bed.inlet_velocity = -0.1"]),
+        ("explain nijsen", ["law", "nijsen", "did you mean 'nijssen'?"]),
         ("explain di_felice --plot nowhere/a.png", ["output = 'nowhere/a.png'", "create nowhere first"]),
         ("view . --movie nowhere/a.gif", ["output = 'nowhere/a.gif'", "create nowhere first"]),
         ("validate binary-colision", ["target", "binary-colision", "did you mean 'binary-collision'"]),

@@ -142,8 +142,21 @@ PATCH = {"patch__jet": {"kind": "inlet", "shape": "disc", "diameter": 0.01, "vel
         ),
         (
             PATCH | {"vapour__inlet_fraction": 0.2, "heat__patch_temperature": {"jet": 310.0}},
-            r"vapour.patch_fraction.jet.*at most saturated; .*at 310 K is 0.03",
+            r"heat.patch_temperature.jet = 310.0: .*at most saturated; vapour.inlet_fraction = 0.2, .*at 310 K is 0.03",
         ),
+        (
+            PATCH | {"vapour__fluid_fraction": 0.2, "heat__patch_temperature": {"jet": 310.0}},
+            r"heat.patch_temperature.jet = 310.0: .*at most saturated; vapour.fluid_fraction = 0.2, .*at 310 K is 0.03",
+        ),
+        (
+            {"vapour__fluid_fraction": 0.2, "heat__inlet_temperature": 310.0},
+            r"vapour.fluid_fraction = 0.2: .*at most saturated; .*at 310 K is 0.03",
+        ),
+        (
+            {"heat__outlet_temperature": 310.0, "vapour__outlet_fraction": 0.2},
+            r"vapour.outlet_fraction = 0.2: .*at most saturated; .*at 310 K is 0.03",
+        ),
+        ({"heat__outlet_temperature": 60.0}, r"heat.outlet_temperature.*253 to 640 K"),
         (PATCH | {"heat__patch_temperature": {"jet": 60.0}}, r"heat.patch_temperature.jet.*253 to 640 K"),
     ],
 )

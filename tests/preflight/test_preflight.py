@@ -219,7 +219,13 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"bed.inlet_velocity": 0.03}, "warning", "bed.inlet_velocity", "below minimum fluidisation, 0.0533 m/s"),
         ({"bed.inlet_velocity": 0.4}, "error", "column.height", "the lid is at 0.16 m"),
         ({"column.ends": "closed"}, "warning", "bed.inlet_velocity", "unused"),
-        ({"fluid": None}, "warning", "bed.inlet_velocity", "unused, because the case has no table [fluid]"),
+        ({"fluid": None}, "warning", "bed.inlet_velocity", "0.157033 m/s is unused, because the case has no"),
+        (
+            {"fluid": None, "bed.jet": {"width": 0.01, "velocity": 2.0}},
+            "warning",
+            "bed.jet.velocity",
+            "2 m/s is unused, because the case has no table [fluid]",
+        ),
         (
             {"run.particle_step": 1e-3},
             "error",

@@ -232,21 +232,21 @@ def reached(home: Path) -> float:
 
 def rows(name: str, runs: Sequence[Means]) -> list[Row]:
     """Means over the packings, with the standard error of their mean."""
-    table = []
+    lines = []
     for quantity, unit in UNITS.items():
         mean, error = over_packings(runs, quantity)
-        table.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
-    return table
+        lines.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
+    return lines
 
 
 def directions(by_state: dict[str, list[Means]], onsets: dict[str, float]) -> list[Row]:
     """Ratios to the dry bed, as logarithms: above 0 where they should rise, with their standard errors."""
-    table = []
+    lines = []
     for name in (state for state in by_state if state != "dry" and "dry" in by_state):
         for quantity, sign in EXPECTED.items():
             ratio, error = over_dry(by_state, name, quantity)
             word = "larger" if sign > 0.0 else "smaller"
-            table.append(
+            lines.append(
                 Row(
                     f"{name}: {quantity.replace('_', ' ')} {word} than dry, logarithm of the ratio",
                     sign * math.log(ratio),
@@ -254,8 +254,8 @@ def directions(by_state: dict[str, list[Means]], onsets: dict[str, float]) -> li
                 )
             )
     for name in (state for state in onsets if state != "dry" and "dry" in onsets):
-        table.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onsets[name] / onsets["dry"]))
-    return table
+        lines.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onsets[name] / onsets["dry"]))
+    return lines
 
 
 def over_dry(by_state: Mapping[str, Sequence[Means]], name: str, quantity: str) -> Estimate:
