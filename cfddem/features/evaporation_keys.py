@@ -91,11 +91,11 @@ class Evaporation(FeatureTable):
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         self._refuse_humidity(case)
-        gases: dict[str, float | None] = {"fluid_temperature": heat.fluid_temperature}
-        gases |= {"inlet_temperature": heat.gas_temperature, "outlet_temperature": heat.outlet_temperature}
+        gases = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
+        gases["outlet_temperature"] = given_or(heat.outlet_temperature, heat.gas_temperature)
         gases |= {f"patch_temperature.{name}": value for name, value in heat.patch_temperature.items()}
         for where, temperature in gases.items():
-            if temperature is not None and not COLDEST <= temperature <= HOTTEST:
+            if not COLDEST <= temperature <= HOTTEST:
                 limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
                 raise InputError(f"heat.{where}", temperature, limit, "the laws are those of water")
         for name in self.drops:
