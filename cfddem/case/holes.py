@@ -58,7 +58,7 @@ def samples_by_cells(places: Array, diameter: float, cell: tuple[float, float]) 
 
     >>> x, y = samples_by_cells(np.array([[0.05, 0.05]]), 0.1, (0.01, 0.01))
     >>> middle = np.histogram2d(x, y, 10, [(0.0, 0.1)] * 2)[0][3:7, 3:7]
-    >>> middle.min(), middle.max()
+    >>> float(middle.min()), float(middle.max())
     (144.0, 144.0)
     """
     even = [2 * math.ceil(0.5 * max(OF_A_CELL, SAMPLES * edge / diameter)) for edge in cell]
