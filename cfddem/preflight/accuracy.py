@@ -20,7 +20,7 @@ PACKED_SMEARED = ((2.0, 0.69), (4.0, 0.89), (8.0, 0.94), (12.0, 0.95))
 """Height of a fixed poured bed in cells of three diameters, and its pressure drop over that of its law, with smeared
 surfaces (`docs/limits.md`, "Scope")."""
 
-PACKED_SHARP = ((1.25, 0.98), (2.5, 0.979), (10.0 / 3.0, 0.94), (5.0, 0.87))
+PACKED_SHARP = ((1.25, 0.98), (2.5, 0.979), (10.0 / 3.0, 0.94), (5.0, 0.83))
 """Cell over diameter, and the pressure drop of a fixed lattice of six layers over that of its law, with sharp surfaces
 (`docs/limits.md`, "Beds"; `pytest -m slow tests/coupling/test_seen_solids.py` holds them to limits)."""
 
