@@ -147,6 +147,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
         velocity[:, rows].mean(axis=1), origin="lower", cmap="viridis", vmin=0.0,
         extent=(0.0, case.column.width, 0.0, case.column.height),
     )  # fmt: skip
+    axes[-3].grid(False)
     drawn.colorbar(air, ax=axes[-3], shrink=0.7, pad=0.04)
     axes[-3].set_title("air, upward  [m/s]", fontsize=9.5)
     tube = tube_of(case)
