@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import reduce
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -173,38 +174,34 @@ class CasePatch(Checked):
 
         radius  of the discs [m]
         """
-        if self.shape == "holes":
-            away = np.full(np.shape(x + y), math.inf)
-            for place in self.places(middle):
-                away = np.minimum(away, np.hypot(x - place[0], y - place[1]))
-            return np.asarray(away + radius <= 0.5 * (self.diameter or 0.0))
-        across, beside = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
         if self.shape == "whole":
-            return np.ones(np.shape(across + beside), bool)
+            return np.ones(np.shape(x + y), bool)
         if self.shape == "box":
+            across, beside = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
             width, depth = self.size or (0.0, 0.0)
             inside = (np.abs(across) + radius <= 0.5 * width) & (np.abs(beside) + radius <= 0.5 * depth)
         else:
-            away = np.hypot(across, beside)
+            away = reduce(np.minimum, (np.hypot(x - a, y - b) for a, b in self.places(middle)))
             inside = away + radius <= 0.5 * (self.diameter or 0.0)
             if self.inner_diameter:
                 inside = inside & (away - radius >= 0.5 * self.inner_diameter)
         return np.asarray(inside)
 
     def places(self, middle: Place) -> Array:
-        """Centres of its holes (N, 2) [m]; `middle` as of `weight`."""
-        if isinstance(self.holes, int):
-            return np.array(self.centre or middle) + in_rows(self.holes, self.pitch or 0.0)
-        return np.array(self.holes or (), float).reshape(-1, 2)
+        """Centres of its holes, or the one centre of another shape (N, 2) [m]; `middle` as of `weight`."""
+        if isinstance(self.holes, tuple):
+            return np.array(self.holes)
+        return np.array(self.centre or middle) + in_rows(self.holes or 1, self.pitch or 0.0)
 
     @property
     def area(self) -> float:
         """Area of the patch; infinite for a whole side [m2]."""
-        if self.shape == "holes":
-            return len(self.places((0.0, 0.0))) * 0.25 * math.pi * (self.diameter or 0.0) ** 2
         if self.size is not None:
             return math.prod(self.size)
-        return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf
+        if not self.diameter:
+            return math.inf
+        number = len(self.places((0.0, 0.0)))
+        return number * 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2)
 
 
 def along(side: str) -> tuple[int, int]:

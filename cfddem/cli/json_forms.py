@@ -322,7 +322,7 @@ def form(name: str) -> Any:
 
 
 def form_of(kind: Any, more: dict[str, Any] | None = None) -> Any:
-    """The form of a dataclass or named tuple as JSON: its values that `repr` shows, where no number is null.
+    """The form of a dataclass or named tuple as JSON: its values that `repr` shows, where NaN is null.
 
     more  further names and types
     """

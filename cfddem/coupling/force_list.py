@@ -46,7 +46,7 @@ class ForceList:
             raise InputError(f"lines of the force {force.name}", force.lines, f"some of {', '.join(LINES)}")
         for field in force.fields:
             particles.declare(field)
-        self._forces = sorted([*self._forces, force], key=lambda force: force.late)
+        self._forces = sorted([*self._forces, force], key=lambda listed: listed.late)
 
     def __iter__(self) -> Iterator[FluidForce]:
         return iter(self._forces)

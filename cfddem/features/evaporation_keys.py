@@ -111,28 +111,31 @@ class Evaporation(FeatureTable):
             if VapourTable.of(case):
                 remedy = "cells do not take the vapour of walls"
                 raise InputError("evaporation.wall_coefficient", self.wall_coefficient, "0 with [vapour]", remedy)
-        vapour, key = VapourTable.of(case), "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
-        if vapour:
-            key = f"vapour.{'fluid' if vapour.inlet_fraction is None else 'inlet'}_fraction"
+        if vapour := VapourTable.of(case):
+            self._refuse_saturated_air(heat, vapour)
         else:
-            key = f"evaporation.{key}"
-        value = vapour.inflow if vapour else given_or(self.relative_humidity, self.vapour_fraction or 0.0)
-        self._refuse_saturated(key, value, heat.gas_temperature, self.partial_pressure(case))
-        if vapour:
-            of_air: dict[str, tuple[float | None, float | None]] = {
-                "vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature),
-                "vapour.outlet_fraction": (vapour.outlet_fraction, heat.outlet_temperature),
-            }
-            for name, fraction in vapour.patch_fraction.items():
-                of_patch = heat.patch_temperature.get(name, heat.gas_temperature)
-                of_air[f"vapour.patch_fraction.{name}"] = fraction, of_patch
-            for where, (share, warmth) in sorted(of_air.items()):
-                if share is not None and warmth is not None:  # others are those of the cell
-                    self._refuse_saturated(where, share, warmth, vapour_pressure(share, self.pressure))
-            for name in sorted(heat.patch_temperature.keys() - vapour.patch_fraction.keys()):
-                temperature, where = heat.patch_temperature[name], f"heat.patch_temperature.{name}"
-                partial = vapour_pressure(vapour.inflow, self.pressure)
-                self._refuse_saturated(where, temperature, temperature, partial, f"{key} = {vapour.inflow:g}, but ")
+            key = "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
+            value = given_or(self.relative_humidity, self.vapour_fraction or 0.0)
+            self._refuse_saturated(f"evaporation.{key}", value, heat.gas_temperature, self.partial_pressure(case))
+
+    def _refuse_saturated_air(self, heat: Heat, vapour: VapourTable) -> None:
+        """Refuse air above saturation at an inlet, at the start, at outlets and at patches."""
+        key = f"vapour.{'fluid' if vapour.inlet_fraction is None else 'inlet'}_fraction"
+        partial = vapour_pressure(vapour.inflow, self.pressure)
+        self._refuse_saturated(key, vapour.inflow, heat.gas_temperature, partial)
+        of_air: dict[str, tuple[float | None, float | None]] = {
+            "vapour.fluid_fraction": (vapour.fluid_fraction, heat.fluid_temperature),
+            "vapour.outlet_fraction": (vapour.outlet_fraction, heat.outlet_temperature),
+        }
+        for name, fraction in vapour.patch_fraction.items():
+            of_patch = heat.patch_temperature.get(name, heat.gas_temperature)
+            of_air[f"vapour.patch_fraction.{name}"] = fraction, of_patch
+        for where, (share, warmth) in sorted(of_air.items()):
+            if share is not None and warmth is not None:  # others are those of the cell
+                self._refuse_saturated(where, share, warmth, vapour_pressure(share, self.pressure))
+        for name in sorted(heat.patch_temperature.keys() - vapour.patch_fraction.keys()):
+            temperature, where = heat.patch_temperature[name], f"heat.patch_temperature.{name}"
+            self._refuse_saturated(where, temperature, temperature, partial, f"{key} = {vapour.inflow:g}, but ")
 
     def _refuse_saturated(self, key: str, value: float, temperature: float, partial: float, brought: str = "") -> None:
         """Refuse air above saturation, with a partial pressure of the vapour [Pa].

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _log = logging.getLogger("cfddem")
 
 MOST_MISSING = 1000
-"""Largest ratio of missing snapshots to those in the folder; beyond it a number is no number of a snapshot."""
+"""Largest ratio of missing snapshots to those in the folder; beyond it a number names no snapshot."""
 
 _SHOWN = ("time", "bed_height", "bed_voidage", "pressure_drop", "largest_speed", "contact_count", "particle_count")
 """Columns of the history that a notebook shows."""

@@ -178,9 +178,8 @@ def _patches(axes: Axes, case: Case) -> None:
         if patch.side not in ENDS:
             _beside(axes, case, name, patch)
             continue
-        middle = patch.centre[0] if patch.centre else 0.5 * width
+        centres = patch.places(middle_of(case, patch.side))[:, 0]
         half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
-        centres = patch.places(middle_of(case, patch.side))[:, 0] if patch.shape == "holes" else [middle]
         z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
         inner = 0.5 * (patch.inner_diameter or 0.0)
         for side, centre in product((-1.0, 1.0), centres):
@@ -188,6 +187,7 @@ def _patches(axes: Axes, case: Case) -> None:
             axes.plot(x, [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
         words = f"{name} {patch.highest:.3g} m/s" if patch.brings else name
         lower = (-0.04 if patch.side == "floor" else 0.02) * height * (1.0 + number % 2)
+        middle = patch.centre[0] if patch.centre else 0.5 * width
         axes.text(middle, z + lower, words, color=colour, fontsize=9.5, ha="center", va="center", **LEGIBLE)
 
 

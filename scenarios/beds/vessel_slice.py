@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -22,8 +22,9 @@ CUBIC_MILLIMETRES = 1e9
 
 
 def draw_spheres(
-    axes: Axes, run: RunData, case: Case, time: float, reach: float, size: float, most: float, by: str = "rise"
-) -> tuple[float, PathCollection]:
+    axes: Axes, run: RunData, case: Case, time: float, reach: float, size: float, most: float,
+    by: Literal["rise", "liquid"] = "rise",
+) -> tuple[float, PathCollection]:  # fmt: skip
     """Spheres near the middle plane, coloured by their upward velocity or by the liquid that they carry.
 
     time     of the snapshot, or near it [s]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_smooth_walls import keeps_mass
+from test_smooth_walls import assert_mass_is_kept
 
 from cfddem.backend.errors import InputError
 from cfddem.fluid.conditions import Periodic
@@ -103,14 +103,14 @@ drawn_as = st.tuples(
 @settings(max_examples=4, deadline=None, derandomize=True)
 @given(drawn_as)
 def test_mass_is_kept_within_a_few_surfaces(drawn):
-    keeps_mass([leaning(*drawn)])
+    assert_mass_is_kept([leaning(*drawn)])
 
 
 @pytest.mark.slow
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(drawn_as)
 def test_mass_is_kept_within_any_surface(drawn):
-    keeps_mass([leaning(*drawn)])
+    assert_mass_is_kept([leaning(*drawn)])
 
 
 def leaning(is_box, a, b, c, lean, spin, x, y):

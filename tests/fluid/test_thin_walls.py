@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_smooth_walls import keeps_mass
+from test_smooth_walls import assert_mass_is_kept
 from test_surfaces_of_triangles import BOX, revolved, turned_by
 
 from cfddem.backend.errors import InputError
@@ -93,14 +93,14 @@ def drawn_walls(a, b, c, lean, spin, x, y):
 @settings(max_examples=4, deadline=None, derandomize=True)
 @given(drawn_as)
 def test_mass_is_kept_beside_a_few_thin_walls(drawn):
-    keeps_mass(drawn_walls(*drawn))
+    assert_mass_is_kept(drawn_walls(*drawn))
 
 
 @pytest.mark.slow
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(drawn_as)
 def test_mass_is_kept_beside_any_thin_walls(drawn):
-    keeps_mass(drawn_walls(*drawn))
+    assert_mass_is_kept(drawn_walls(*drawn))
 
 
 # ---------------------------------------------------------------- fluid sticks to both sides

@@ -138,18 +138,19 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     for axis, time in zip(axes, times):
         shown, balls = draw_spheres(axis, run, case, time, reach=0.75, size=9.0, most=MOST, by="liquid")
         axis.set_title(f"{shown:.2f} s", fontsize=9.5)
+    *_, flow, curve, histogram = axes
     bar = drawn.colorbar(balls, ax=axes[len(times) - 1], shrink=0.7, pad=0.04, extend="max")
     bar.ax.set_title("mm3", fontsize=9.5)
     late = [n for n, time in enumerate(run.times) if time > 0.5 * run.times[-1]]
     velocity = np.mean([run.fluid("velocity", n)[..., 2] for n in late], axis=0)
     rows = slice(velocity.shape[1] // 2 - 1, velocity.shape[1] // 2 + 1)
-    air = axes[-3].imshow(
+    air = flow.imshow(
         velocity[:, rows].mean(axis=1), origin="lower", cmap="viridis", vmin=0.0,
         extent=(0.0, case.column.width, 0.0, case.column.height),
     )  # fmt: skip
-    axes[-3].grid(False)
-    drawn.colorbar(air, ax=axes[-3], shrink=0.7, pad=0.04)
-    axes[-3].set_title("air, upward  [m/s]", fontsize=9.5)
+    flow.grid(False)
+    drawn.colorbar(air, ax=flow, shrink=0.7, pad=0.04)
+    flow.set_title("air, upward  [m/s]", fontsize=9.5)
     tube = tube_of(case)
     ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
     for axis in axes[:-2]:
@@ -158,16 +159,16 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
             axis.plot(2 * [tube.point[0] + side * (tube.radius or 0.0)], ends, color=WALL, lw=1.6)
     for axis in axes[1:-2]:
         axis.set(ylabel="", yticklabels=[])
-    pellets, curve = circulation(run, case), axes[-2]
+    pellets = circulation(run, case)
     curve.plot(pellets.time, pellets.rising / 1e3, color=BLUE, label="rise in the tube")
     curve.plot(pellets.time, pellets.falling / 1e3, color=ORANGE, label="fall around it")
     curve.set(xlabel="time  [s]", ylim=(0.0, 1.4e-3 * float(np.nanmax(pellets.rising))))
     curve.set_title("pellets in a second, thousands", fontsize=9.5)
     legend(curve, loc="upper right")
     carried = coating(run, case).liquid * CUBIC_MILLIMETRES
-    axes[-1].hist(carried[carried > 0.0], bins=np.linspace(0.0, 2.0 * MOST, 25), color=BLUE)
-    axes[-1].set(xlabel="liquid on a pellet  [mm3]", yscale="log")
-    axes[-1].set_title("wet pellets, at the end", fontsize=9.5)
+    histogram.hist(carried[carried > 0.0], bins=np.linspace(0.0, 2.0 * MOST, 25), color=BLUE)
+    histogram.set(xlabel="liquid on a pellet  [mm3]", yscale="log")
+    histogram.set_title("wet pellets, at the end", fontsize=9.5)
     save(drawn, path)
 
 
