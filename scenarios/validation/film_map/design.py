@@ -48,7 +48,10 @@ ROOM = 1.6
 """Height of the column over that of the bed by Richardson and Zaki, at least."""
 
 REFERENCE_SPEED = 0.64
-"""Speed of the fastest collisions over the superficial velocity, as in the case of the lubrication study."""
+"""Speed of the fastest collisions over the superficial velocity."""
+
+REFERENCE_VELOCITY = 0.0785
+"""Superficial velocity at which contacts are as soft as those of the lubrication study [m/s]."""
 
 
 class Point(NamedTuple):
@@ -128,8 +131,7 @@ def bed(point: Point, film: str, seed: int) -> Case:
         case.particle_count * math.pi / 6.0 * case.bed.diameter**3 / (case.column.floor_area * point.solid_fraction)
     )
     end, reference = TURNOVERS * height / velocity, gallery()["lubrication-study"]
-    assert isinstance(reference.bed.inlet_velocity, float)
-    faster = (velocity / reference.bed.inlet_velocity) ** 2
+    faster = (velocity / REFERENCE_VELOCITY) ** 2
     solid, liquid = reference.solid.density, reference.required_fluid.density
     heavier = (point.density_ratio - 1.0) * liquid / (solid - liquid)
     modulus, cell = reference.solid.contact_modulus, case.column.cell
