@@ -21,8 +21,7 @@ from pylatexenc.macrospec import MacroSpec
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.tables import line_width
-from cfddem.case.absent import TABLES, absent
-from cfddem.case.input_errors import sections_of
+from cfddem.case.input_errors import TABLES, absent, sections_of
 from cfddem.case.schema import Case
 from cfddem.cli.scenario_commands import descriptions
 from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named

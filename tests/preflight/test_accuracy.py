@@ -16,7 +16,7 @@ from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.preflight import accuracy
-from cfddem.preflight.accuracy import BY_KERNEL, GAS, LIQUID, PACKED_SHARP, PACKED_SMEARED, widening
+from cfddem.preflight.overview import BY_KERNEL, GAS, LIQUID, PACKED_SHARP, PACKED_SMEARED, widening
 from cfddem.preflight.summary import preflight
 from cfddem.run import build
 from scenarios.beds.gas_bed.study import mueller
