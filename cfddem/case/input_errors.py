@@ -25,15 +25,15 @@ Key = tuple[str | int, ...]
 class InputErrors(InputError):
     """Several input errors, one line each.
 
-    each     the errors
+    errors   the errors
     omitted  number of further errors that are not listed
     """
 
-    def __init__(self, each: Sequence[InputError], omitted: int = 0) -> None:
-        first = each[0]
+    def __init__(self, errors: Sequence[InputError], omitted: int = 0) -> None:
+        first = errors[0]
         super().__init__(first.field, first.value, first.limit, first.remedy)
-        self.each = tuple(each)
-        self.args = ("\n".join([*map(str, each), *([f"and {omitted} more input errors"] if omitted else [])]),)
+        self.errors = tuple(errors)
+        self.args = ("\n".join([*map(str, errors), *([f"and {omitted} more input errors"] if omitted else [])]),)
 
 
 def dotted(key: Iterable[str | int]) -> str:

@@ -414,7 +414,7 @@ def _mistakes(message: str, failure: BaseException | None) -> Iterator[Mistake]:
         for issue in issues:
             yield {"message": str(issue), "key": issue.key, "limit": issue.reason, "remedy": issue.remedy}
         return
-    errors: tuple[CfddemError, ...] = getattr(failure, "each", (failure,) if isinstance(failure, InputError) else ())
+    errors: tuple[CfddemError, ...] = getattr(failure, "errors", (failure,) if isinstance(failure, InputError) else ())
     if not errors:
         for line in message.splitlines():
             yield {"message": line}

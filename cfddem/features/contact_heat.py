@@ -225,14 +225,14 @@ def conductances(pairs, choices, result):
 class HeatExchangeOfContacts(CaseFeature):
     """Temperatures of particles that touch each other and walls.
 
-    from_walls  heat given by the walls so far [J]
-    radiated    heat received from the surroundings so far [J]
-    gained      change of the heat of the particles by this exchange, from their temperatures [J]
-    scale       heat that particles gained and lost so far, without sign [J]
-    held        heat capacity of all particles in the last exchange [J/K]
+    from_walls      heat given by the walls so far [J]
+    radiated        heat received from the surroundings so far [J]
+    gained          change of the heat of the particles by this exchange, from their temperatures [J]
+    scale           heat that particles gained and lost so far, without sign [J]
+    total_capacity  heat capacity of all particles in the last exchange [J/K]
     """
 
-    name, table, kept = "contact heat", "contact_heat", ("from_walls", "radiated", "gained", "scale", "held")
+    name, table, kept = "contact heat", "contact_heat", ("from_walls", "radiated", "gained", "scale", "total_capacity")
     measures = (
         Measured("mean_temperature", "K", "measure", "mean temperature of the particles, by heat capacity",
                  mean_temperature, lambda case: not Heat.of(case)),
@@ -254,7 +254,7 @@ class HeatExchangeOfContacts(CaseFeature):
         self.emissivities = keys.by_material(case, "emissivity", 0.0)
         self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
         self.from_walls, self.radiated, self.gained, self.scale = 0.0, 0.0, 0.0, 0.0
-        self.held, self._step = float(simulation.communicator.sum(self.capacity(simulation.owned))), 0.0
+        self.total_capacity, self._step = float(simulation.communicator.sum(self.capacity(simulation.owned))), 0.0
         self.choices = Choices(
             contact={"none": NONE, "smooth": SMOOTH, "rough": ROUGH}[keys.contact],
             by_force=keys.radius == "hertz",
@@ -297,7 +297,7 @@ class HeatExchangeOfContacts(CaseFeature):
         At least over that of a thousandth of a kelvin: where less was exchanged, rounding would be over rounding.
         """
         wrong = abs(self.gained - self.from_walls - self.radiated)
-        return wrong / max(self.scale, LEAST * self.held) if wrong > 0.0 else 0.0
+        return wrong / max(self.scale, LEAST * self.total_capacity) if wrong > 0.0 else 0.0
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""
@@ -341,7 +341,9 @@ class HeatExchangeOfContacts(CaseFeature):
 
         at_walls = total(np.append(of_power, from_walls)), total(np.abs(np.append(of_power, from_walls)))
         gained = capacity * (particles.temperature - start)
-        radiated, gains, size, self.held = total([absorbed, gained, np.abs(absorbed), capacity], axis=1).tolist()
+        radiated, gains, size, self.total_capacity = total(
+            [absorbed, gained, np.abs(absorbed), capacity], axis=1
+        ).tolist()
         self.from_walls += at_walls[0]
         self.radiated += radiated
         self.gained += gains
