@@ -261,12 +261,12 @@ class TwoSides(OneSide):
             + ASIDE * spacing
         )
         away, is_open = self._thin.side(centres), cells.open.ravel()
-        near = np.flatnonzero(np.abs(away) < BESIDE * spacing.max())
+        near = np.flatnonzero(np.abs(away) < BESIDE * spacing.max())  # local: one process
         of_side = []
         for sign in (1.0, -1.0):
             mine = ((sign * away > 0.0) & is_open).reshape(grid.shape)
             home = np.arange(away.size)
-            if mine.any():
+            if mine.any():  # local: likewise
                 nearest = distance_transform_edt(~mine, sampling=grid.spacing[::-1], return_indices=True)[1]
                 nearest_cells = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()[near]
                 home[near] = np.where(self._thin.between(centres[near], centres[nearest_cells]), nearest_cells, near)
@@ -282,7 +282,7 @@ class TwoSides(OneSide):
 
     def choose(self, position: Array, first: np.ndarray) -> None:
         """See `OneSide.choose`."""
-        rows = np.flatnonzero(self._beside[first].any(axis=1))
+        rows = np.flatnonzero(self._beside[first].any(axis=1))  # local: likewise
         first[rows[self._thin.side(position[rows]) < 0.0]] += np.uint32(self._count)
 
 

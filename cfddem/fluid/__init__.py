@@ -13,6 +13,6 @@ step_limit   the largest stable step at these rates; nothing compiled
 checks       checks of input and of divergence
 solver       the fluid: its fields, their values in cells and at points, and the step
 budgets      momentum, drag and energy of the step just made
-scalar       temperature or a vapour in every cell: its step, its conditions (scalar_conditions) at sides and
-             smooth walls (scalar_walls), its loops (scalar_loops)
+scalar       temperature or a vapour in every cell: its step, its conditions at the sides (scalar_conditions,
+             scalar_sides), its loops (scalar_loops)
 """

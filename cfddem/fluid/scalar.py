@@ -46,7 +46,8 @@ from cfddem.fluid.scalar_loops import (
     take_exchange,
     volume_fluxes,
 )
-from cfddem.fluid.scalar_walls import SideFaces, scalar_walls
+from cfddem.fluid.scalar_sides import SideFaces
+from cfddem.fluid.scalar_walls import scalar_walls
 from cfddem.fluid.solver import FluidSolver
 
 FOLLOW = 0.05

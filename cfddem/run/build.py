@@ -402,7 +402,7 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
             )
         elif name == inlets[-1]:  # all inlets at once: two may share a face
             speeds = [(of_side.patches[one].speed, of_side.shares[one]) for one in inlets]
-            entering = np.sum([share for _, share in speeds], axis=0) > 0.0
+            entering = np.sum([share for _, share in speeds], axis=0) > 0.0  # local: patches of the whole box
             velocity = _velocity(case, side, speeds, _before(listed[0]), of_side.rest)
             conditions.append(Inlet(velocity, where=_at(case, side, entering)))
     return conditions

@@ -40,7 +40,6 @@ LOCAL_FILES = {
     "particles/walls/": "every rank knows all walls",
     "particles/initial/": "every rank makes all particles before the run starts",
     "coupling/self_disturbance_tables.py": "every rank computes the tables of the whole lattice",
-    "run/patches.py": "every rank knows the patches of the whole box",
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
     "fluid/cut_cells.py": "every rank knows the smooth walls of the whole box",
@@ -52,7 +51,6 @@ LOCAL_FILES = {
     "fluid/thin_walls.py": "every rank knows the walls of the whole box",
     "fluid/wall_force.py": "along the axes of one cell",
     "coupling/merged_cells.py": "for one process alone",
-    "coupling/two_sides.py": "for one process alone",
 }
 """Files and folders that reduce only arrays that every rank knows whole: the input of a run, and what is made before it
 starts."""
