@@ -15,7 +15,8 @@ from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from cfddem.preflight.overview import BY_KERNEL, GAS, LIQUID, PACKED_SHARP, PACKED_SMEARED, Change, widening
+from cfddem.preflight import accuracy
+from cfddem.preflight.accuracy import BY_KERNEL, GAS, LIQUID, PACKED_SHARP, PACKED_SMEARED, widening
 from cfddem.preflight.summary import preflight
 from cfddem.run import build
 from scenarios.beds.gas_bed.study import mueller
@@ -75,7 +76,7 @@ def test_a_run_has_the_surfaces_of_its_case(surface: str, sharp: bool) -> None:
 
 
 @pytest.mark.parametrize("change", [*LIQUID, *GAS], ids=lambda each: each.row)
-def test_changes_are_those_of_the_stored_tables(change: Change) -> None:
+def test_changes_are_those_of_the_stored_tables(change: accuracy.Change) -> None:
     rows = {each["quantity"]: each for each in json.loads((TABLES / f"{change.table}.json").read_text())["rows"]}
     value = rows[change.row]["value"]
     error = float(re.findall(r"standard error (?:of the paired difference )?(\S+)", rows[change.row]["note"])[0])

@@ -1,0 +1,137 @@
+"""What cells, kernel and fluid step cost in accuracy, as far as it was measured in beds of the validation.
+
+LIQUID and GAS are rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`). The other numbers are
+those of pages; no command computes them again, except those of a lattice. Another bed may differ from all of these.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+from cfddem.case.patches import ENDS
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.step_estimate import StepEstimate
+
+PACKED_SMEARED = ((2.0, 0.69), (4.0, 0.89), (8.0, 0.94), (12.0, 0.95))
+"""Height of a fixed poured bed in cells of three diameters, and its pressure drop over that of its law, with smeared
+surfaces (`docs/limits.md`, "Scope")."""
+
+PACKED_SHARP = ((1.25, 0.98), (2.5, 0.979), (10.0 / 3.0, 0.94), (5.0, 0.83))
+"""Cell over diameter, and the pressure drop of a fixed lattice of six layers over that of its law, with sharp surfaces
+(`docs/limits.md`, "Beds"; `pytest -m slow tests/coupling/test_seen_solids.py` holds them to limits)."""
+
+BY_KERNEL = ((1.0, 1.11), (1.5, 1.0), (2.0, 0.90), (2.5, 0.80))
+"""Width of the kernel in diameters, and the granular temperature of the bed of glass beads with agitation and smeared
+surfaces, over that at 1.5. One run of 2.2 s each (`scenarios/validation/agitation/README.md`, "Step, filter and
+cells")."""
+
+
+class Change(NamedTuple):
+    """By what a result changed in a bed of the validation, with smeared surfaces."""
+
+    name: str
+    value: float
+    error: float  # standard error
+    table: str  # of `docs/tables`
+    row: str  # that it is read from
+    bed: str
+
+    @property
+    def note(self) -> str:
+        """Standard error and bed, in words."""
+        return f"+- {self.error:.2g}, {self.bed}"
+
+
+STEPS = "smooth, 1e+05 Pa: {}, fluid step over a tenth of it"
+FINER = "{} gas bed, cells finer by 1.5: {} over the reference run"
+
+LIQUID = (
+    Change("tenth of fluid step: collisions", 0.944, 0.028, "bed-steps", STEPS.format("collisions of a sphere"),
+           "film study"),
+    Change("the same: granular temperature", 0.948, 0.012, "bed-steps", STEPS.format("granular temperature"),
+           "film study"),
+    Change("cells finer by 1.5: bed height", 1.008, 0.004, "beds",
+           "liquid bed, cells finer by 1.5: height over the reference run", "alginate bed"),
+)  # fmt: skip
+"""Beds in a liquid."""
+
+GAS = (
+    Change("cells finer by 1.5: bed height", 0.997, 0.005, "beds", FINER.format("slugging", "height"), "slugging bed"),
+    Change("the same: pressure drop", 0.998, 0.004, "beds", FINER.format("slugging", "pressure drop"), "slugging bed"),
+    Change("the same: its deviation in time", 0.77, 0.039, "beds",
+           FINER.format("slugging", "standard deviation of the pressure"), "slugging bed"),
+)  # fmt: skip
+"""Beds in a gas."""
+
+
+def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tuple[str, float, str, str]]:
+    """Name, value, unit and note of what the cells, the kernel and the fluid step of a case change.
+
+    Only of beds on a grid, with the kernel; nothing of what was not measured: a bed without flow from below that is not
+    fixed, one beside inlets in its sides, and one that particles leave.
+    """
+    width = case.laws.kernel_width * case.bed.largest_diameter
+    if steps.cells is None or not case.resists or case.is_one_sphere or width == 0.0:
+        return
+    sharp = case.surface == "sharp"
+    cell = max(length / count for length, count in zip(case.column.size, steps.cells) if count > 1)
+    yield "filter width / kernel", widening(cell / width, case.surface), "", "of what drag sees; cells widen it"
+    if math.isnan(bed.archimedes) or _is_no_plain_bed(case):
+        return
+    if case.bed.fixed or 0.0 < bed.inlet <= bed.onset:
+        high = bed.height / case.column.height * steps.cells[2]
+        table, at = (PACKED_SHARP, cell / case.bed.diameter) if sharp else (PACKED_SMEARED, high)
+        measured = "a lattice of six layers" if sharp else f"fixed beds, here {high:.2g} cells"
+        yield "packed bed: pressure drop / law", between(table, at), "", f"as measured in {measured}"
+        return
+    if bed.inlet == 0.0:
+        return
+    other = ", with smeared surfaces" if sharp else ""
+    for figure in LIQUID if case.in_liquid else GAS:
+        yield figure.name, figure.value, "", figure.note + other
+    if case.in_liquid and case.laws.kernel_width != 1.5:
+        note = f"over 1.5 d, glass beads{other}"
+        yield "this kernel: granular temperature", between(BY_KERNEL, case.laws.kernel_width), "", note
+
+
+def _is_no_plain_bed(case: Case) -> bool:
+    """Whether particles leave the bed, or fluid enters through its sides."""
+    patches = case.patches.values()
+    leave = bool(case.outlet) or any(patch.particles == "leave" for patch in patches)
+    return leave or any(patch.kind == "inlet" and patch.side not in ENDS for patch in patches)
+
+
+def widening(cell: float, surface: str) -> float:
+    r"""Standard deviation of the filter of what the drag sees, over that of the kernel [-].
+
+    .. math:: \sqrt{\max(1, h^2/6\sigma^2) + h^2/6\sigma^2}
+
+    with smeared surfaces. With sharp ones, whose cells are up to four times finer, the root of
+    :math:`\max(1, h^2/48\sigma^2)`.
+
+    cell     over the standard deviation of the kernel [-]
+    surface  "smeared" or "sharp"
+
+    >>> round(widening(2.0, "smeared"), 2), widening(2.0, "sharp")
+    (1.29, 1.0)
+    """
+    own = cell**2 / 6.0
+    return math.sqrt(max(1.0, own) + own if surface == "smeared" else max(1.0, own / 8.0))
+
+
+def between(table: tuple[tuple[float, float], ...], at: float) -> float:
+    """Value of a table of (place, value), linear between its places and constant beyond them.
+
+    >>> between(((1.0, 0.5), (3.0, 0.7)), 2.0)
+    0.6
+    """
+    if at <= table[0][0]:
+        return table[0][1]
+    for (low, first), (high, last) in pairwise(table):
+        if at <= high:
+            return first + (last - first) * (at - low) / (high - low)
+    return table[-1][1]
