@@ -15,8 +15,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from cfddem.cli.app import app, main
-from cfddem.cli.json_forms import form
-from cfddem.cli.json_output import word
+from cfddem.cli.json_output import form, word
 
 HOME = Path(__file__).parents[1]
 WIDTH = 100

@@ -18,6 +18,7 @@ from cfddem.case.bed import at_times
 from cfddem.case.compare import (
     HELD,
     PROFILES,
+    Array,
     CaseData,
     Points,
     points_of,
@@ -25,7 +26,6 @@ from cfddem.case.compare import (
     unknown_quantity,
     value_columns,
 )
-from cfddem.case.data_table import Array
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 

@@ -1,4 +1,4 @@
-"""How values look in a notebook: tables, and spheres as a small drawing.
+"""How values look in a notebook: tables, and spheres as a small drawing; and templates of pages.
 
 >>> table("Run", [("time", "0.2 s")])
 '<div><b>Run</b><table><tr><td>time</td><td>0.2 s</td></tr></table></div>'
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -105,3 +106,11 @@ def _text(value: Any) -> str:
     if callable(value):
         return str(getattr(value, "__name__", "user-defined law"))
     return f"{value:g}" if isinstance(value, float) else str(shown(value))
+
+
+@cache
+def page_template(name: str) -> Any:
+    """The template of a page, by the name of its file in `cfddem/plotting`."""
+    from jinja2 import Environment, PackageLoader
+
+    return Environment(loader=PackageLoader("cfddem", "plotting"), autoescape=True).get_template(name)

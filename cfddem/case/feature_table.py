@@ -22,6 +22,12 @@ ROOM = Path(__file__).parents[1] / "features"
 
 Model = TypeVar("Model", bound=BaseModel)
 
+Findings = Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]
+"""Severity, key, reason and remedy of each issue that `check` tells."""
+
+Numbers = Iterator[tuple[str, str, float, str, str]]
+"""Group, name, value, unit and note of each number that `check` tells."""
+
 
 class FeatureTable(Checked):
     """A table of a case that a feature or a user owns; cases have it as soon as the class is there.
@@ -55,15 +61,15 @@ class FeatureTable(Checked):
     def refuse(self, case: Any) -> None:
         """Raise InputError where the table does not go with the rest of a case."""
 
-    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues(self, case: Any) -> Findings:
         """Severity, key, reason and remedy of each issue that `check` tells."""
         return iter(())
 
-    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+    def numbers(self, case: Any, bed: Any) -> Numbers:
         """Group, name, value, unit and note of each number that `check` tells; bed is its estimate of the bed."""
         return iter(())
 
-    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues_of_bed(self, case: Any, bed: Any) -> Findings:
         """Issues as of `issues`, which need the estimate of the bed."""
         return iter(())
 

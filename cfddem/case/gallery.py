@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.case.absent import absent
-from cfddem.case.input_errors import sections_of
+from cfddem.case.input_errors import absent, sections_of
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +19,9 @@ from pydantic import (
 
 from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.case.input_errors import dotted, input_error
+
+KeysOf = Mapping[str, Sequence[str]]
+"""Names of keys by shape."""
 
 
 class Checked(BaseModel):
@@ -47,6 +50,17 @@ class Checked(BaseModel):
         )
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # a nested description keeps its own errors
+
+    def _require_keys_of(self, shape: str, own: KeysOf, needed: KeysOf) -> None:
+        """Refuse keys that only other shapes have, and require those that this one needs; both by shape."""
+        for name in sorted({name for names in own.values() for name in names} - {*own[shape]}):
+            if getattr(self, name) != type(self).model_fields[name].default:
+                owners = " or ".join(f'"{other}"' for other, names in own.items() if name in names)
+                limit = f'left out for shape = "{shape}"'
+                raise InputError(name, shown(getattr(self, name)), limit, f"it belongs to shape = {owners}")
+        for name in needed[shape]:
+            if getattr(self, name) in (None, ()):
+                raise InputError(name, None, f'given for shape = "{shape}"')
 
     def _repr_html_(self) -> str:
         """The keys that differ from their defaults, in a notebook."""

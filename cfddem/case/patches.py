@@ -95,12 +95,7 @@ class CasePatch(Checked):
 
     @model_validator(mode="after")
     def _keys_suit_kind_and_shape(self) -> CasePatch:
-        for name in sorted({name for names in OWN_KEYS.values() for name in names} - {*OWN_KEYS[self.shape]}):
-            if getattr(self, name) is not None:
-                raise InputError(name, shown(getattr(self, name)), f'left out for shape = "{self.shape}"')
-        for name in NEEDED[self.shape]:
-            if getattr(self, name) is None:
-                raise InputError(name, None, f'given for shape = "{self.shape}"')
+        self._require_keys_of(self.shape, OWN_KEYS, NEEDED)
         for name, kinds in OF_KINDS.items():
             if self.kind not in kinds and getattr(self, name) != type(self).model_fields[name].default:
                 raise InputError(name, shown(getattr(self, name)), f'left out for kind = "{self.kind}"')

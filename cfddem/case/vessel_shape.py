@@ -72,14 +72,7 @@ class CaseVessel(Checked):
 
     @model_validator(mode="after")
     def _keys_suit_the_shape(self) -> CaseVessel:
-        for name in sorted({name for names in OWN_KEYS.values() for name in names} - {*OWN_KEYS[self.shape]}):
-            if getattr(self, name) != type(self).model_fields[name].default:
-                owners = " or ".join(shape for shape, names in OWN_KEYS.items() if name in names)
-                limit = f'left out for shape = "{self.shape}"'
-                raise InputError(name, shown(getattr(self, name)), limit, f"it belongs to a {owners}")
-        for name in NEEDED[self.shape]:
-            if getattr(self, name) in (None, ()):
-                raise InputError(name, None, f'given for shape = "{self.shape}"')
+        self._require_keys_of(self.shape, OWN_KEYS, NEEDED)
         if self.shape == "cylinder" and self.radius == 0.0:
             raise InputError("radius", self.radius, "above 0")
         require_surface_file(self.file)

@@ -50,15 +50,19 @@ def triangles(wall: CaseWall) -> Array:
 def _around(wall: CaseWall) -> Array:
     """Triangles of an open cylinder or cone (T, 3, 3) [m]."""
     axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    one /= np.linalg.norm(one)
-    angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)[:, None]
-    circle = np.cos(angle) * one + np.sin(angle) * np.cross(axis, one)
-    own = wall.radius or 0.0
-    low = np.array(wall.point) + own * circle
-    high = np.array(wall.point) + (wall.length or 0.0) * axis + (wall.top_radius or own) * circle
+    around, own = circle(axis, SIDES), wall.radius or 0.0
+    low = np.array(wall.point) + own * around
+    high = np.array(wall.point) + (wall.length or 0.0) * axis + (wall.top_radius or own) * around
     after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
     return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
+
+
+def circle(axis: Array, count: int) -> Array:
+    """Points on a circle of radius 1 about an axis of unit length (count, 3)."""
+    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    one /= np.linalg.norm(one)
+    angle = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
+    return np.asarray(np.cos(angle) * one + np.sin(angle) * np.cross(axis, one))
 
 
 def is_closed(corners: Array) -> bool:

@@ -92,18 +92,7 @@ class CaseWall(Checked):
 
     @model_validator(mode="after")
     def _keys_suit_the_shape(self) -> CaseWall:
-        for name in sorted({name for names in OWN_KEYS.values() for name in names} - {*OWN_KEYS[self.shape]}):
-            if getattr(self, name) != type(self).model_fields[name].default:
-                owners = " or ".join(shape for shape, names in OWN_KEYS.items() if name in names)
-                raise InputError(
-                    name,
-                    shown(getattr(self, name)),
-                    f'left out for shape = "{self.shape}"',
-                    f"it belongs to a {owners}",
-                )
-        for name in NEEDED[self.shape]:
-            if getattr(self, name) is None:
-                raise InputError(name, None, f'given for shape = "{self.shape}"')
+        self._require_keys_of(self.shape, OWN_KEYS, NEEDED)
         for name in ("normal", "axis"):
             if not math.hypot(*getattr(self, name)) > 0.0:
                 raise InputError(name, getattr(self, name), "a direction other than zero")

@@ -7,7 +7,7 @@ import json
 import math
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,8 @@ from pylatexenc.macrospec import MacroSpec
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.tables import line_width
-from cfddem.case.absent import TABLES, absent
-from cfddem.case.input_errors import sections_of
+from cfddem.case.input_errors import TABLES, absent, sections_of
 from cfddem.case.schema import Case
-from cfddem.cli.scenario_commands import descriptions
 from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
 from closures import registry
 from closures.registry import Law
@@ -233,6 +231,32 @@ def plot(law: Law, output: Path) -> Path:
     axes.set_title("\n".join(textwrap.wrap(", ".join(rest), 70)) or law.kind, loc="left", fontsize=9)
     plots.save(figure, output)
     return output
+
+
+def descriptions(function: Callable[..., Any]) -> dict[str, str]:
+    """Description of each argument, from the docstring; arguments on one line share it.
+
+    >>> def area(width: float, height: float) -> float:
+    ...     '''Area of a rectangle.
+    ...
+    ...     width, height  of one side,
+    ...                    without the rim [m]
+    ...     returns        [m2]
+    ...     '''
+    >>> descriptions(area)["height"]
+    'of one side, without the rim [m]'
+    """
+    texts: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(function) or "").splitlines():
+        if match := re.fullmatch(r"(\w+(?:, \w+)*) {2,}(\S.*)", line):
+            names = match[1].split(", ")
+            texts |= dict.fromkeys(names, match[2])
+        elif names and line.startswith("  "):
+            texts |= dict.fromkeys(names, f"{texts[names[0]]} {line.strip()}")
+        else:
+            names = []
+    return texts
 
 
 def unit(law: Law, name: str) -> str:

@@ -45,14 +45,14 @@ def courant_step(speed: float, spacing: Sequence[float]) -> float:
     return COURANT * min(spacing) / max(speed, 1e-300)
 
 
-def fluid_step_limits(particle_step: float, given: float | None, flow: Mapping[str, float]) -> dict[str, float]:
+def fluid_step_limits(particle_step: float, of_case: float | None, flow: Mapping[str, float]) -> dict[str, float]:
     """Every limit of the fluid step by its criterion [s].
 
     particle_step  [s]
-    given          step that the case gives; None if it gives none [s]
+    of_case        step that the case gives; None if it gives none [s]
     flow           limits by fluid, inlet and moving particles; empty without a fluid [s]
     """
     limits = {"collision": MOST_SUBSTEPS * particle_step}
-    if given is not None:
-        limits["given"] = given
+    if of_case is not None:
+        limits["given"] = of_case
     return limits | dict(flow)

@@ -31,9 +31,8 @@ import numpy as np
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
-from cfddem.coupling.ghost_deposit import GhostDeposit
+from cfddem.coupling.ghost_deposit import GhostDeposit, sides_of
 from cfddem.coupling.merged_cells import merged_cells
-from cfddem.coupling.two_sides import sides_of
 from cfddem.fluid.grid import AT_CENTRES, HIGH, LOW, Array, Grid, sample
 from cfddem.fluid.halo import Halo
 from cfddem.particles.ghosts import SingleDomain

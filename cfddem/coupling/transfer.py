@@ -111,15 +111,15 @@ class Transfer:
         return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
 
     def apply(
-        self, particles: Particles, cell_map: ParticleCellMap, sent: ImplicitCoefficients, weight: Array, seen: Array
+        self, particles: Particles, cell_map: ParticleCellMap, sent: ImplicitCoefficients, weight: Array, value: Array
     ) -> Array:
         """Return the rate at which each particle receives the quantity in this step (N, m), and store it.
 
         sent    what `prepare` returned
         weight  W: the cell has given W h (b* v* - b* u) per volume (nz, ny, nx, m) [-]
-        seen    u, the value of the fluid in its implicit step (nz, ny, nx, m)
+        value   u, the value of the fluid in its implicit step (nz, ny, nx, m)
         """
-        fields = np.concatenate([np.moveaxis(field, -1, 0) for field in (weight, weight * seen)])
+        fields = np.concatenate([np.moveaxis(field, -1, 0) for field in (weight, weight * value)])
         return self.receive(particles, sent, self.kernel.sample(cell_map.stencil, cell_map.radius, fields))
 
     def receive(self, particles: Particles, sent: ImplicitCoefficients, gathered: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
-from cfddem.case.feature_table import FeatureTable
+from cfddem.case.feature_table import FeatureTable, Findings
 from cfddem.case.materials import Checked
 from cfddem.features.heat_keys import Heat, Temperature
 from closures.contact_heat import jump_distance
@@ -188,13 +187,13 @@ class ContactHeat(FeatureTable):
                 key = f"particle_temperature.{name}" if by_name else "particle_temperature"
                 raise InputError(f"contact_heat.{key}", value, "at least 0 K, absolute zero", "temperatures are in K")
 
-    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues(self, case: Any) -> Findings:
         """Tell what the exchange cannot see."""
         if self.radius == "overlap_circle" and any(material.contact_modulus for material in case.material.values()):
             reason = "contacts are softened by contact_modulus, and the circle of intersection grows with it"
             yield "warning", "contact_heat.radius", reason, 'take radius = "hertz", which uses youngs_modulus'
 
-    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues_of_bed(self, case: Any, bed: Any) -> Findings:
         """Warn where a particle in a fluid has no single temperature."""
         if heat := Heat.of(case):
             others = {name: value for name, value in self.conductivity.items() if name not in heat.solid_conductivity}

@@ -153,16 +153,16 @@ class EnergyLedger(CaseFeature):
         """Add the work on the fluid, after `Coupling.apply` and before the particles move."""
         assert self.fluid is not None and self._work is not None
         fluid, sums, done = self.fluid, self.sums, budgets.works(self.fluid)
-        sums["inflow"] += done.inflow + done.held
+        sums["inflow"] += done.inflow + done.inlet_drag
         sums["driving"] += done.driving
         sums["model_b"] += done.model_b + (done.solids if fluid.model == "B" else 0.0)
         sums["viscous"] -= done.viscous
         sums["convection"] -= done.convection
         sums["implicit_drag"] -= done.implicit
-        sums["drag_in_cells"] -= done.drag - done.held
+        sums["drag_in_cells"] -= done.drag - done.inlet_drag
         sums["lift_and_added_mass"] -= done.source
         sums["torque"] -= terms.spin_work
-        sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
+        sums["drag_from_fluid"] -= done.drag - done.inlet_drag + done.implicit
         sums["pressure_from_fluid"] -= done.solids
         self._work.begin(terms)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
-from cfddem.case.feature_table import FeatureTable
+from cfddem.case.feature_table import FeatureTable, Findings, Numbers
 from cfddem.features.heat_keys import GROUP, Heat, given_or, transfer_number
 from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
@@ -190,7 +189,7 @@ class Evaporation(FeatureTable):
         fraction = vapour_fraction(self.partial_pressure(case), self.pressure)
         return wet_bulb_temperature(heat.gas_temperature, fraction, self.pressure, ratio)
 
-    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues(self, case: Any) -> Findings:
         """Tell the wet-bulb temperature, and what leaves no bond."""
         reason = f"the wet-bulb temperature is {self.wet_bulb(case):.2f} K at {case.reference_speed:g} m/s"
         yield "note", "evaporation", reason, "wet particles come to it while they dry at a constant rate"
@@ -198,7 +197,7 @@ class Evaporation(FeatureTable):
             reason = "bonds form between particles; films, and bridges at walls, leave nothing when they dry"
             yield "note", "liquid.bond", reason, "the solids of the liquid have no mass"
 
-    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+    def numbers(self, case: Any, bed: Any) -> Numbers:
         """The wet bulb, the water that the air can carry, that of the spray, and the time of drying."""
         heat, water, flow = Heat.of(case), self.water(case, bed), bed.inflow * case.fluid.density
         assert heat
@@ -215,7 +214,7 @@ class Evaporation(FeatureTable):
         if water.at_start > 0.0 and water.rate > 0.0:
             yield GROUP, "drying time", water.at_start / water.rate, "s", "of the liquid at the start, all wet"
 
-    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues_of_bed(self, case: Any, bed: Any) -> Findings:
         """Check a spray against what the air can carry, and that the air notices what evaporates."""
         water, vapour = self.water(case, bed), VapourTable.of(case)
         sprayed, most = water.sprayed, water.carried

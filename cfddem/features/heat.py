@@ -161,8 +161,8 @@ class HeatExchange(CaseFeature):
             brought = sums["inflow"] - sums["outflow"] + sums["walls"] + sums["displaced"] - self.given
             wrong = max(wrong, abs(self.cells.content - brought))
             scale += abs(sums["inflow"]) + abs(sums["walls"])
-        held = float(self.communicator.sum(self._capacity)) + (self.cells.capacity if self.cells else 0.0)
-        return wrong / max(scale, LEAST * held)
+        capacity = float(self.communicator.sum(self._capacity)) + (self.cells.capacity if self.cells else 0.0)
+        return wrong / max(scale, LEAST * capacity)
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
-from cfddem.case.feature_table import FeatureTable
+from cfddem.case.feature_table import FeatureTable, Findings, Numbers
 from cfddem.case.patches import refuse_no_inlets
 from cfddem.fluid.scalar_conditions import SOLID, ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from closures.heat_transfer import ranz_marshall
@@ -227,7 +227,7 @@ class Heat(FeatureTable):
                     walls[side] = wall
         return ScalarSides(self.gas_temperature, self.outlet_temperature, walls)
 
-    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+    def numbers(self, case: Any, bed: Any) -> Numbers:
         """Numbers of the largest particles in the flow of the bed, and times of heating."""
         fluid, largest = case.fluid, max(case.species.values(), key=lambda species: species.diameter)
         reynolds, prandtl = reynolds_of(case, bed), fluid.viscosity * self.fluid_heat_capacity / self.conductivity
@@ -251,7 +251,7 @@ class Heat(FeatureTable):
             time = capacity / (bed.inflow * fluid.density * self.fluid_heat_capacity)
             yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
 
-    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues(self, case: Any) -> Findings:
         """Warn where the density differs too much for the approximation of Boussinesq."""
         of_others = (*self.wall_temperature.values(), *self.patch_temperature.values())
         others = (self.gas_temperature, self.particle_temperature, *of_others)
@@ -262,13 +262,11 @@ class Heat(FeatureTable):
             remedy = "gas that is warmed does not expand here: take velocities at the temperature of the bed"
             yield "warning", "heat.buoyancy", reason, remedy
 
-    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues_of_bed(self, case: Any, bed: Any) -> Findings:
         """Warn where a particle has no single temperature."""
         return self.issues_of_biot(case, bed, "heat.solid_conductivity", self.solid_conductivity)
 
-    def issues_of_biot(
-        self, case: Any, bed: Any, key: str, of_solid: Mapping[str, float]
-    ) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def issues_of_biot(self, case: Any, bed: Any, key: str, of_solid: Mapping[str, float]) -> Findings:
         """Warn where a particle has no single temperature, by the conductivities of a key."""
         for name in sorted({case.material_name_of(species) for species in case.species.values()} & of_solid.keys()):
             biot = self.nusselt(case, bed) * self.conductivity / (6.0 * of_solid[name])

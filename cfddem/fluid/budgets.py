@@ -115,7 +115,7 @@ class Works(NamedTuple):
 
     kinetic: float  # change of the kinetic energy
     inflow: float  # of the pressure at inlets and outlets, and kinetic energy carried through them
-    held: float  # of the inlets, which hold their velocity against the drag of particles beside them
+    inlet_drag: float  # of the inlets, which hold their velocity against the drag of particles beside them
     driving: float  # of the mean pressure gradient of periodic sides
     solids: float  # of the pressure on the volume that moving particles displace
     model_b: float  # of the pressure on the particles' share of the volume, which model B gives to the fluid
@@ -141,7 +141,7 @@ def works(fluid: FluidSolver) -> Works:
     return Works(
         kinetic=sums["kinetic"],
         inflow=pressed + brought,
-        held=by_inlets,
+        inlet_drag=by_inlets,
         driving=sums["driving"],
         solids=sums["pressure"] - pressed,
         model_b=sums["model_b"],

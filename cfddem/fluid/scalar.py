@@ -266,7 +266,7 @@ class Scalar:
             groups.copy(fields.next)
         fields.swap("value", "next")
         self._cells["stored"][:] -= step * self.flow.growth
-        self._of_walls += self._walls.given
+        self._of_walls += self._walls.supplied
         return carried_by
 
     def _count(self, carried_by: Carried, flows: Array) -> None:

@@ -34,14 +34,14 @@ LEAST_RISE = 1e-9
 class InsulatedWalls:
     """Smooth walls through which nothing passes, or none at all.
 
-    spread  as :class:`cfddem.fluid.cell_groups.SingleCells`, by walls alone
-    rate    of each cell by coefficients of walls, beyond conduction (nz, ny, nx) [1/s]
-    given   what the walls have given in the step [the value times m3]
+    spread    as :class:`cfddem.fluid.cell_groups.SingleCells`, by walls alone
+    rate      of each cell by coefficients of walls, beyond conduction (nz, ny, nx) [1/s]
+    supplied  what the walls have given in the step [the value times m3]
     """
 
     spread: Any = 0.0
     rate: Any = 0.0
-    given = 0.0
+    supplied = 0.0
 
     def correct(self, value: Array, carried_by: Carried, stage: int) -> None:
         """Correct gradients beside the walls, and find what these give, in a stage."""
@@ -94,7 +94,7 @@ class ScalarWalls(InsulatedWalls):
         mean = self._entered.mean(axis=0) if stage else self._entered[0]
         left.reshape(-1)[self.at] -= mean
         if stage:
-            self.given = step * float(mean.sum()) * self._volume
+            self.supplied = step * float(mean.sum()) * self._volume
 
 
 def scalar_walls(fluid: FluidSolver, groups: Any, wall: Wall | None, capacity: float) -> InsulatedWalls:

@@ -50,6 +50,9 @@ STIFF = 1.0
 SETTLED = 0.01
 """Change of the velocity between two passes, over the largest velocity, that ends the repetition."""
 
+PASSES = 3
+"""Most runs of the second stage where drag is stiff."""
+
 
 @dataclass(frozen=True)
 class StepReport:
@@ -72,7 +75,6 @@ class FluidSolver:
     smagorinsky   constant C of the sub-grid viscosity rho (C Delta)^2 |S|, about 0.1; 0 for none
     voidage       (nz, ny, nx) at the start, or a number
     tolerance     largest continuity residual of a cell over the largest flux through a face
-    passes        most runs of the second stage where drag is stiff
     communicator  path to sums, extremes and decisions over all ranks
 
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
@@ -94,7 +96,6 @@ class FluidSolver:
         smagorinsky: float = 0.0,
         voidage: Array | float = 1.0,
         tolerance: float = 1e-9,
-        passes: int = 3,
         communicator: Communicator = SERIAL,
     ) -> None:
         if not (np.isfinite(density) and density > 0.0):
@@ -109,7 +110,7 @@ class FluidSolver:
         refuse_trapped_inflow(grid, sides)
         self.grid, self.boundaries, self.communicator = grid, sides, communicator
         self.density, self.model, self.gravity = float(density), model, np.asarray(gravity, dtype=float)
-        self.tolerance, self.passes = float(tolerance), int(passes)
+        self.tolerance = float(tolerance)
         self.time, self.last_step = 0.0, 0.0
         self.followers: list[Any] = []
         self.body_forces: list[Callable[[], Array]] = []
@@ -164,11 +165,11 @@ class FluidSolver:
         # Second stage: the average of start and end; again while drag is stiff and the end still moves.
         np.copyto(fields.stored_voidage, fields.mean_voidage)
         tight = self.tolerance * scale
-        for passes in range(1, self.passes + 1):
+        for passes in range(1, PASSES + 1):
             self._find_explicit_force(fields.stage_velocity, fields.other_voidage, fields.stage_force, self._medium)
             self._predict(fields.other_velocity, step, weight=0.5)
             iterations.append(self._project(fields.other_velocity, fields.other_voidage, tight, scale, fresh=False))
-            if passes == self.passes or not self._still_moves(step):
+            if passes == PASSES or not self._still_moves(step):
                 break
             fields.swap("stage_velocity", "other_velocity")
 

@@ -87,7 +87,7 @@ class _Counter:
 
     def stored(self, engine: Engine) -> dict[str, float]:
         """Energy that all edges store, by its form [J]."""
-        stored = self._tally.held[engine.edges.first < engine.particles.owned]
+        stored = self._tally.stored[engine.edges.first < engine.particles.owned]
         return {self.account.form: float(engine.communicator.sum(stored))} if self.account.form else {}
 
 
@@ -163,7 +163,7 @@ class Energies(ParticleFeature):
         self._renew(engine)
         count, total, mine = self._count, engine.communicator.sum, engine.edges.first < engine.particles.owned
         forms = {
-            "normal_springs": total(count.held[mine]),
+            "normal_springs": total(count.spring_energy[mine]),
             "tangential_springs": 0.5 * total((count.stiffness * count.spring)[mine]),
         }
         for counter in self._counters:

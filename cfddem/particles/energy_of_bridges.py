@@ -40,12 +40,12 @@ def _follow_bridges(system, tally):
         while end < number and of_same_wall(begin, end, edges, walls):
             if memory.bridge_film[end] > 0.0 or memory.bridge_change[end] < 0:
                 taken = end
-            elif tally.held[end] != 0.0:
+            elif tally.stored[end] != 0.0:
                 left = end
             end += 1
         if left >= 0 and taken >= 0:
-            tally.held[taken], tally.pulled[taken] = tally.held[left], tally.pulled[left]
-            tally.held[left], tally.pulled[left] = 0.0, 0.0
+            tally.stored[taken], tally.pull_work[taken] = tally.stored[left], tally.pull_work[left]
+            tally.stored[left], tally.pull_work[left] = 0.0, 0.0
         begin = end
 
 
@@ -94,25 +94,25 @@ def _count_bridge(k, system, tally, step, before, after, totals):
         totals[-1] += by_wall
         note_bridge_loss(k, memory, lost)
     if change < 0:
-        totals[BROKEN] += tally.held[k] - tally.pulled[k]
-    stored, pulled = tally.held[k], tally.pulled[k]
-    tally.held[k] = 0.0
-    tally.pulled[k] = 0.0
+        totals[BROKEN] += tally.stored[k] - tally.pull_work[k]
+    stored, pulled = tally.stored[k], tally.pull_work[k]
+    tally.stored[k] = 0.0
+    tally.pull_work[k] = 0.0
     if not (BRIDGE_PULL or BRIDGE_APART) or not bridged:
         return
     if BRIDGE_PULL:
         _, _, gap = geometry(k, system)
         reduced_radius, _ = pair_mass_and_radius(k, system)
-        tally.held[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
+        tally.stored[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
     work, by_wall = _pulled(k, system, before, -1.0)
     totals[-1] += by_wall
     if change > 0:
-        totals[FORMED] += tally.held[k] + work
+        totals[FORMED] += tally.stored[k] + work
     elif step > 0.0 and (BRIDGE_APART or stored != 0.0) and memory.bridge_resistance[k] > 0.0:
-        surplus = pulled + work + tally.held[k] - stored
+        surplus = pulled + work + tally.stored[k] - stored
         totals[RESISTANCE] -= surplus
         note_bridge_loss(k, memory, -surplus)
-    tally.pulled[k], by_wall = _pulled(k, system, after, 1.0)
+    tally.pull_work[k], by_wall = _pulled(k, system, after, 1.0)
     totals[-1] += by_wall
 
 
@@ -152,16 +152,16 @@ def _count_bond(k, system, tally, step, before, after, totals):
     """Count the bond of edge k at this instant."""
     memory = system.memory
     if memory.bond_radius[k] == 0.0:
-        totals[BONDS_BROKEN] += tally.held[k] - tally.pulled[k] if step > 0.0 else 0.0
-        tally.held[k] = 0.0
-        tally.pulled[k] = 0.0
+        totals[BONDS_BROKEN] += tally.stored[k] - tally.pull_work[k] if step > 0.0 else 0.0
+        tally.stored[k] = 0.0
+        tally.pull_work[k] = 0.0
         return
     force, couple, moment, energy = bond_loads(k, system)
     whole = at(memory.bond_force, k), at(memory.bond_couple, k), at(memory.bond_moment, k)
     damping = minus(whole[0], force), minus(whole[1], couple), minus(whole[2], moment)
     totals[DAMPING] -= _bond_work(k, system, damping, before, -1.0) + _bond_work(k, system, damping, after, 1.0)
-    tally.held[k] = energy
-    tally.pulled[k] = _bond_work(k, system, whole, after, 1.0)
+    tally.stored[k] = energy
+    tally.pull_work[k] = _bond_work(k, system, whole, after, 1.0)
 
 
 BONDS = EnergyAccount(("bond_damping", "bonds_broken"), _count_bond, pairs_only=True, form="bonds")

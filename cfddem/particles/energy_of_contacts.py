@@ -64,8 +64,8 @@ class Count(NamedTuple):
     spring: np.ndarray  # (n,) square of the tangential spring [m2]
     stiffness: np.ndarray  # (n,) tangential, times the share of the solids in the load [N/m]
     power: np.ndarray  # (n,) going into the tangential spring [W]
-    held: np.ndarray  # (n,) energy of the normal spring [J]
-    yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
+    spring_energy: np.ndarray  # (n,) energy of the normal spring [J]
+    hysteresis_loss: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
     push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with films or bridges [N]
     twist: np.ndarray  # (n, 3) its moment over the radius, the same on both bodies [N]
     totals: np.ndarray  # (2, CHUNKS, channels + 2); the second half is of pairs that another rank adds [J]
@@ -75,11 +75,23 @@ def allocate_tally(engine: Engine) -> Count:
     """A count with all values 0, for the present particles and pairs."""
     number, count = len(engine.edges.first), engine.particles.count
     ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
-    spring, stiffness, power, spring_energy, yielded = np.zeros((5, number))
+    spring, stiffness, power, spring_energy, hysteresis_loss = np.zeros((5, number))
     push, twist = np.zeros((2, number, 3))
     totals = np.zeros((2, CHUNKS, len(CHANNELS) + 2))
     return Count(
-        ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, spring_energy, yielded, push, twist, totals
+        ahead,
+        spin_ahead,
+        moved,
+        turned,
+        drifted,
+        spring,
+        stiffness,
+        power,
+        spring_energy,
+        hysteresis_loss,
+        push,
+        twist,
+        totals,
     )
 
 
@@ -109,8 +121,8 @@ class Tally(NamedTuple):
 
     ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
     spin_ahead: np.ndarray  # (N, 3) likewise [rad/s]
-    held: np.ndarray  # (n,) energy that each edge stores [J]
-    pulled: np.ndarray  # (n,) work of what stores it, in the half kick after the last count [J]
+    stored: np.ndarray  # (n,) energy that each edge stores [J]
+    pull_work: np.ndarray  # (n,) work of what stores it, in the half kick after the last count [J]
     totals: np.ndarray  # (2, CHUNKS, channels + 1); the second half is of pairs that another rank adds [J]
 
 
@@ -256,8 +268,8 @@ def _forget(k, count, totals, step):
     count.spring[k] = 0.0
     count.stiffness[k] = 0.0
     count.power[k] = 0.0
-    count.held[k] = 0.0
-    count.yielded[k] = 0.0
+    count.spring_energy[k] = 0.0
+    count.hysteresis_loss[k] = 0.0
     put(count.push, k, NOTHING)
     put(count.twist, k, NOTHING)
 
@@ -333,8 +345,8 @@ def _contact_works(k, system, count, step, duration, totals):
     square, rate = dot(spring, spring), tangential * dot(spring, slip)
     yielded = portion(edges, k) * lost_energy(state, row, p, m, d)
     if step > 0.0:
-        totals[HYSTERESIS] += yielded - count.yielded[k]
-        note_loss(k, memory, DAMPING, yielded - count.yielded[k])
+        totals[HYSTERESIS] += yielded - count.hysteresis_loss[k]
+        note_loss(k, memory, DAMPING, yielded - count.hysteresis_loss[k])
         softer, was = count.stiffness[k], count.spring[k]
         kept = was * softer / tangential if RESCALED and tangential > softer else was
         taken = 0.25 * (softer + tangential) * (square - kept)
@@ -346,8 +358,8 @@ def _contact_works(k, system, count, step, duration, totals):
     count.spring[k] = square
     count.stiffness[k] = tangential
     count.power[k] = rate
-    count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
-    count.yielded[k] = yielded
+    count.spring_energy[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
+    count.hysteresis_loss[k] = yielded
     if JOINT:
         put(count.push, k, minus(times(elastic, normal), times(tangential, spring)))
         put(count.twist, k, times(tangential * stretch, cross(normal, spring)))

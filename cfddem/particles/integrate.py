@@ -91,6 +91,17 @@ def wall_contact(k, system, step):
 
 
 @part
+def wall_forces(system, step):
+    """Films and contacts of all edges between particles and walls."""
+    edges = system.edges
+    for n in prange(edges.between_particles, len(edges.first)):
+        k = np.uint64(n)
+        if FILM:
+            update_edge_film(k, system, step)
+        wall_contact(k, system, step)
+
+
+@part
 def add_film_forces(system):
     """Add the forces of films that act as explicit forces."""
     edges, memory = system.edges, system.memory
@@ -114,14 +125,10 @@ def find_forces(system, step):
     step  by which springs have moved since the last forces; 0 at the start [s]
     """
     edges = system.edges
-    pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     if FILM:
-        update_films(0, pairs, system, step)
-        for k in range(pairs, number):
-            update_edge_film(k, system, step)
-    pair_forces(0, near, system, step)
-    for k in range(pairs, number):
-        wall_contact(np.uint64(k), system, step)
+        update_films(0, edges.between_particles, system, step)
+    pair_forces(0, may_touch(edges), system, step)
+    wall_forces(system, step)
     if FILM and not DRIFTING:
         add_film_forces(system)
     if BOND:

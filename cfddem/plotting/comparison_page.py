@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from cfddem.analysis.report import case_of
 from cfddem.analysis.report_text import spelled, with_error
 from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.html import page_template
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run
@@ -42,8 +42,9 @@ def comparison_page(folders: Sequence[Path], output: Path, result: dict[str, Any
     figures = {"Histories": encoded(histories(runs, names))}
     if (drawn := profiles(runs, names, result)) is not None:
         figures["Profiles over the averaging window"] = encoded(drawn)
-    text = _template().render(result=result, names=names, key_results=_key_results(result), measures=_measures(result),
-                              figures=figures)  # fmt: skip
+    text = page_template("comparison.html").render(
+        result=result, names=names, key_results=_key_results(result), measures=_measures(result), figures=figures
+    )
     write_whole(output, text.encode())
     return output
 
@@ -92,13 +93,6 @@ def profiles(runs: Sequence[RunData], names: Sequence[str], result: dict[str, An
     axes[0].set_ylabel("height  [m]")
     legend_below(figure, axes[0])
     return figure
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, PackageLoader
-
-    return Environment(loader=PackageLoader("cfddem", "plotting"), autoescape=True).get_template("comparison.html")
 
 
 def _key_results(result: dict[str, Any]) -> list[tuple[str, list[str]]]:

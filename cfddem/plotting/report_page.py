@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from cfddem.analysis.report_text import (
 from cfddem.analysis.run_warnings import NOTE
 from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
 from cfddem.backend.errors import CfddemError, RunFailed
+from cfddem.backend.html import page_template
 from cfddem.case.compare import ABSCISSAE
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
@@ -98,7 +98,7 @@ def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
     case, end, steps = with_files(case_of(run), data), result.window[1], result.steps
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
     figures = figures_of(run, case, result).items()
-    text: str = _template().render(
+    text: str = page_template("report.html").render(
         result=result,
         status=f"{result.status} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
@@ -115,13 +115,6 @@ def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
         **{function.__name__: function for function in (with_error, spelled, shown_unit, steadiness)},
     )
     return text
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, PackageLoader
-
-    return Environment(loader=PackageLoader("cfddem", "plotting"), autoescape=True).get_template("report.html")
 
 
 # ---------------------------------------------------------------- tables

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.analysis.report import case_of
 from cfddem.backend.errors import CfddemError
-from cfddem.case.wall_geometry import extent, triangles
+from cfddem.case.wall_geometry import circle, extent, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.io.reading import RunData
 from cfddem.particles.walls.motion import Motion
@@ -94,11 +94,8 @@ def _round(
 ) -> Any:
     """A surface of revolution between two circles."""
     axis = axis / np.linalg.norm(axis)
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    one /= np.linalg.norm(one)
-    angle = np.linspace(0.0, 2.0 * math.pi, AROUND, endpoint=False)[:, None]
-    circle = np.cos(angle) * one + np.sin(angle) * np.cross(axis, one)
-    points = np.concatenate([point + end * axis + radius * circle for end, radius in zip(ends, radii)])
+    around = circle(axis, AROUND)
+    points = np.concatenate([point + end * axis + radius * around for end, radius in zip(ends, radii)])
     here, after = np.arange(AROUND), np.roll(np.arange(AROUND), -1)
     faces = np.stack([here, after, after + AROUND, here + AROUND], axis=1)
     side = _polygons(points, faces)

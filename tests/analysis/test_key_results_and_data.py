@@ -20,8 +20,7 @@ from cfddem.analysis.report_text import lines as report_lines
 from cfddem.analysis.report_text import markdown
 from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import CaseData, points_of
-from cfddem.case.data_table import read_table
+from cfddem.case.compare import CaseData, points_of, read_table
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.plotting.case_drawing import case_drawing

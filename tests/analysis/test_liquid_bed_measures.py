@@ -20,7 +20,7 @@ from cfddem.analysis.waves import LayerMap, waves
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.plotting.study_figures import wave_map
-from cfddem.run.bed_measures import collisional_pressure, floor_pressure
+from cfddem.run.history import collisional_pressure, floor_pressure
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 

@@ -11,8 +11,7 @@ from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import CaseData, points_of
-from cfddem.case.data_table import read_table
+from cfddem.case.compare import CaseData, points_of, read_table
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.summary import preflight

@@ -52,7 +52,6 @@ LOCAL_FILES = {
     "fluid/thin_walls.py": "every rank knows the walls of the whole box",
     "fluid/wall_force.py": "along the axes of one cell",
     "coupling/merged_cells.py": "for one process alone",
-    "coupling/two_sides.py": "for one process alone",
 }
 """Files and folders that reduce only arrays that every rank knows whole: the input of a run, and what is made before it
 starts."""

@@ -43,7 +43,7 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
     refusal = refused(text, {"column.width": -1})
     assert isinstance(refusal, InputErrors)
     reported = str(refusal).splitlines()
-    assert len(reported) == len(refusal.each) == 5
+    assert len(reported) == len(refusal.errors) == 5
     lines = {
         name: 1 + next(k for k, line in enumerate(text.split("\n")) if name in line) for name in ("thick", "cuont")
     }

@@ -18,7 +18,7 @@ from cfddem.case.schema import Case
 from cfddem.features.feeds import Feeds
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
-from cfddem.run.bed_measures import bed_height, bed_solids
+from cfddem.run.history import bed_height, bed_solids
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 

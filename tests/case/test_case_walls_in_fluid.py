@@ -18,7 +18,7 @@ from cfddem.features.feeds import Feeds
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
 from cfddem.preflight.summary import preflight
-from cfddem.run.bed_measures import open_area, open_volume
+from cfddem.run.history import open_area, open_volume
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import HOME, WIDTH, call, cfddem, commands, parsed
 
-from cfddem.case.absent import TABLES, absent
+from cfddem.case.input_errors import TABLES, absent
 from cfddem.cli.app import app
 
 

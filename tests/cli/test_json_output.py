@@ -11,8 +11,7 @@ from command_line import HOME, call, commands, parsed
 from made_up_run import made_up
 
 from cfddem.backend.json_text import as_json
-from cfddem.cli.json_forms import SCHEMAS
-from cfddem.cli.json_output import word
+from cfddem.cli.json_output import SCHEMAS, word
 
 
 def test_every_command_that_prints_results_has_json() -> None:

@@ -151,10 +151,10 @@ def test_rounding_of_temperatures_that_are_equal_is_no_imbalance() -> None:
         simulation.step()
     heat = simulation.feature(HeatExchangeOfContacts)
     assert heat.imbalance < 1e-6
-    heat.gained, heat.scale = 1e-13 * heat.held, 1e-13 * heat.held  # as rounding leaves it
-    assert heat.held == pytest.approx(float(heat.capacity(simulation.particles).sum()), rel=1e-14)
+    heat.gained, heat.scale = 1e-13 * heat.total_capacity, 1e-13 * heat.total_capacity  # as rounding leaves it
+    assert heat.total_capacity == pytest.approx(float(heat.capacity(simulation.particles).sum()), rel=1e-14)
     assert heat.imbalance == pytest.approx(1e-10, rel=1e-6)  # of a thousandth of a kelvin
-    heat.gained = 1e-2 * heat.held  # heat from nowhere is seen as before
+    heat.gained = 1e-2 * heat.total_capacity  # heat from nowhere is seen as before
     heat.scale = heat.gained
     assert heat.imbalance == pytest.approx(1.0)
 

@@ -25,9 +25,8 @@ from cfddem.io import checkpoint
 from cfddem.io.writer import RunFolder
 from cfddem.run import runner
 from cfddem.run.progress import Status
-from cfddem.run.runner import Run
+from cfddem.run.runner import Run, StopRequest
 from cfddem.run.simulation import Simulation
-from cfddem.run.stopping import StopRequest
 
 
 def begin(folder: Path, text: str = TINY, report: Callable[[Status], None] = lambda _: None) -> Run:

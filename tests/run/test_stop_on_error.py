@@ -15,8 +15,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.run.initial_particles import LARGEST_EXPANDED_FRACTION, expanded_height
-from cfddem.run.runner import Run
-from cfddem.run.stopping import averages_from
+from cfddem.run.runner import Run, averages_from
 
 TIME = np.linspace(0.0, 10.0, 2000)
 

@@ -61,9 +61,9 @@ coefficient = Slot("coefficient")
 class AddedMass(FluidForce):
     """Added mass of the particles and its force.
 
-    given    C, or a law C(voidage)
-    density  rho of the fluid [kg/m3]
-    passing  places among the cells, and slip -> the change of the fluid velocity along the slip; none if not given
+    coefficient  C, or a law C(voidage)
+    density      rho of the fluid [kg/m3]
+    passing      places among the cells, and slip -> the change of the fluid velocity along the slip; none if not given
     """
 
     name, lines, sets_inertia = "added_mass", ("explicit",), True
@@ -71,18 +71,18 @@ class AddedMass(FluidForce):
 
     def __init__(
         self,
-        given: float | Law,
+        coefficient: float | Law,
         density: float,
         passing: Callable[[ParticleCellMap, Array], Array] = lambda _, slip: np.zeros_like(slip),
     ) -> None:
         self.density, self._passing = density, passing
-        self._varies = isinstance(given, Law)
+        self._varies = isinstance(coefficient, Law)
         self._deferred = np.zeros((0, 3))
-        if isinstance(given, Law):
-            law = bind_arguments(given.function, "voidage", {"voidage": "voidage"})
+        if isinstance(coefficient, Law):
+            law = bind_arguments(coefficient.function, "voidage", {"voidage": "voidage"})
             self._fill = specialise(_coefficients, {"coefficient": law})
         else:
-            self._fill = lambda voidage, values: values.fill(float(given))
+            self._fill = lambda voidage, values: values.fill(float(coefficient))
 
     def begin(self, terms: CouplingTerms) -> None:
         """Set the inertia of the step; what the particles owe the fluid is taken with that of the last step."""

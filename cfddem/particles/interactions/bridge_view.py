@@ -128,16 +128,16 @@ class Bridges(ParticleFeature):
         gap = solver.gap[rows]
         return gap, longest - gap
 
-    def dry(self, rows: np.ndarray, lost: np.ndarray, known: BridgeSystem | None = None) -> float:
+    def dry(self, rows: np.ndarray, lost: np.ndarray, bridges: BridgeSystem | None = None) -> float:
         """Let bridges lose water; those that have none left break with the next step.
 
         rows     of their edges, also of those whose first body another process owns (n,)
         lost     volume (n,), below 0 where vapour condenses [m3]
-        known    the present bridges as loops take them; found if None
+        bridges  the present ones as loops take them; found if None
         returns  energy of the pulls that is gone, of bridges whose first body this process owns [J]
         """
         system = self._solver.system
-        return float(self._dry(rows, lost, known or BridgeSystem.of(system), system.parameters))
+        return float(self._dry(rows, lost, bridges or BridgeSystem.of(system), system.parameters))
 
     @cached_property
     def _dry(self) -> Any:

@@ -154,7 +154,7 @@ def pairs_at_walls(system):
     particles, edges, walls = system.particles, system.edges, system.walls
     return WallPairs(
         edges.between_particles, edges.first, edges.second, system.memory.minimum_gap, edges.touch,
-        particles.position, particles.velocity, particles.radius, system.parameters.free,
+        particles.position, particles.velocity, particles.radius, np.array(system.parameters.free),
         walls.kind, walls.shape, walls.corner, walls.wall, walls.velocity, walls.spin, walls.centre, walls.shift,
         walls.turned, walls.sweep,
     )  # fmt: skip

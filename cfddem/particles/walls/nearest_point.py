@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import inline, serial
+from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.vectors import at, cross, dot, minus, plus, put, times
 
 PLANE, TRIANGLE, REVOLVED, SOLID_CYLINDER = 0, 1, 2, 3
@@ -68,7 +68,7 @@ class WallPairs(NamedTuple):
     position: np.ndarray  # of the particles [m]
     moved: np.ndarray  # velocity of the particles [m/s]
     radius: np.ndarray  # of the particles [m]
-    free: tuple[float, float, float]  # 1 for each axis along which particles can move
+    free: np.ndarray  # (3,) 1 for each axis along which particles can move
     kind: np.ndarray  # of the pieces, and so on: see `Walls`
     shape: np.ndarray
     corner: np.ndarray
@@ -227,34 +227,38 @@ def carried_back(walls, m, place):
     return plus(back, at(walls.centre, m))
 
 
-@serial
+@part
 def touch(at_walls):
     """Geometry of each particle-wall edge: normal, distance, velocity of the surface, turning rate of the normal."""
-    pairs, free = at_walls.between_particles, at_walls.free
-    for k in range(pairs, len(at_walls.first)):
-        i, w = np.int64(at_walls.first[k]), np.int64(at_walls.second[k])
-        m = np.int64(at_walls.wall[w])
-        place = at(at_walls.position, i)
-        local = in_frame(at_walls, m, place)
-        normal, distance, feature, curvature, bend, direction = nearest(at_walls.kind, at_walls.shape, w, local)
-        row = TOUCH * (k - pairs)
-        _put(at_walls.touch, row + PLACE, local)
-        _put(at_walls.touch, row + FOOT, minus(local, times(distance, normal)))
-        if at_walls.sweep[m] != 0.0:
-            normal, direction = _rotated(at_walls.turned, m, normal), _rotated(at_walls.turned, m, direction)
-        velocity, spin = at(at_walls.velocity, m), at(at_walls.spin, m)
-        arm = minus(place, plus(at(at_walls.centre, m), at(at_walls.shift, m)))
-        surface = plus(velocity, cross(spin, minus(arm, times(distance, normal))))
-        moved = at(at_walls.moved, i)
-        moved = (free[0] * moved[0], free[1] * moved[1], free[2] * moved[2])
-        moved = minus(moved, plus(velocity, cross(spin, arm)))
-        turn = plus(times(curvature, moved), times(bend * dot(moved, direction), direction))
-        _put(at_walls.touch, row + NORMAL, normal)
-        at_walls.touch[row + DISTANCE] = distance
-        _put(at_walls.touch, row + SURFACE, surface)
-        _put(at_walls.touch, row + TURN, plus(turn, cross(spin, normal)))
-        at_walls.touch[row + FEATURE] = feature
-        at_walls.touch[row + SHARE] = 1.0
+    for k in prange(at_walls.between_particles, len(at_walls.first)):
+        _touch_edge(k, at_walls)
+
+
+@inline
+def _touch_edge(k, at_walls):
+    i, w, free = np.int64(at_walls.first[k]), np.int64(at_walls.second[k]), at_walls.free
+    m = np.int64(at_walls.wall[w])
+    place = at(at_walls.position, i)
+    local = in_frame(at_walls, m, place)
+    normal, distance, feature, curvature, bend, direction = nearest(at_walls.kind, at_walls.shape, w, local)
+    row = TOUCH * (k - at_walls.between_particles)
+    _put(at_walls.touch, row + PLACE, local)
+    _put(at_walls.touch, row + FOOT, minus(local, times(distance, normal)))
+    if at_walls.sweep[m] != 0.0:
+        normal, direction = _rotated(at_walls.turned, m, normal), _rotated(at_walls.turned, m, direction)
+    velocity, spin = at(at_walls.velocity, m), at(at_walls.spin, m)
+    arm = minus(place, plus(at(at_walls.centre, m), at(at_walls.shift, m)))
+    surface = plus(velocity, cross(spin, minus(arm, times(distance, normal))))
+    moved = at(at_walls.moved, i)
+    moved = (free[0] * moved[0], free[1] * moved[1], free[2] * moved[2])
+    moved = minus(moved, plus(velocity, cross(spin, arm)))
+    turn = plus(times(curvature, moved), times(bend * dot(moved, direction), direction))
+    _put(at_walls.touch, row + NORMAL, normal)
+    at_walls.touch[row + DISTANCE] = distance
+    _put(at_walls.touch, row + SURFACE, surface)
+    _put(at_walls.touch, row + TURN, plus(turn, cross(spin, normal)))
+    at_walls.touch[row + FEATURE] = feature
+    at_walls.touch[row + SHARE] = 1.0
 
 
 @inline

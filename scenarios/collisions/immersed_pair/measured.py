@@ -15,8 +15,7 @@ import numpy as np
 
 from cfddem.analysis.measured import MeasuredComparison
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import ERROR, Points
-from cfddem.case.data_table import Array, Column, read_table
+from cfddem.case.compare import ERROR, Array, Column, Points, read_table
 from cfddem.io.files import require_folder
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
 from scenarios.collisions.immersed_pair.study import Collision
