@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cfddem.case.bed import Jet
+from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.fluid.cell_counts import suggested_cells
@@ -21,6 +23,9 @@ SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 Below the first, a sphere has more volume than its kernel can hold; below the second, the voidage is poor [-].
 """
 
+OF_SPHERE = 1.0 / math.sqrt(20.0)
+"""Standard deviation of the volume of a sphere along a line, over the diameter; a narrower kernel is none [-]."""
+
 FINEST = 6.0
 """More cells than this per standard deviation of the kernel cost time and resolve nothing more [-]."""
 
@@ -29,6 +34,9 @@ FEWEST_DIAMETERS = 2.0
 
 UNEQUAL = 1.2
 """Ratio of species diameters from which a drag law should depend on the diameter ratio [-]."""
+
+INEXACT_JET = 0.1
+"""Difference between the flow of a jet and that through the cells that it covers, over the first, for a warning [-]."""
 
 FEWEST_CELLS = 4.0
 """Fewest cells over the height of a fluidised bed and over the wider side of its column [-]."""
@@ -40,6 +48,23 @@ PROFILE_RANGE = 2.0
 def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
     """Check that the filter kernel is wide enough for a particle, and the cells not needlessly small."""
     assert steps.cells is not None
+    width, widest = case.laws.kernel_width, max(case.column.size[:2])
+    across = 2.0 * width * case.bed.largest_diameter
+    if 0.0 < width < OF_SPHERE:
+        yield Issue(
+            "warning", "laws.kernel_width",
+            f"{width:.3g} diameters is narrower than a sphere, whose volume has a standard deviation of "
+            f"{OF_SPHERE:.2g}: it filters nothing",
+            "use 1.5, the default, or 0 for no kernel",
+        )  # fmt: skip
+        return
+    if across > widest and not case.is_one_sphere:
+        yield Issue(
+            "warning", "laws.kernel_width",
+            f"{width:.3g} diameters on both sides, {across:.2g} m, is more than the column is wide, {widest:.3g} m",
+            "use 1.5, the default, or a wider column",
+        )  # fmt: skip
+        return
     spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
     yield from _check_smallest_cell(case, min(spacing, default=min(case.column.size)))
 
@@ -65,7 +90,7 @@ def _check_smallest_cell(case: Case, smallest: float, suggests: bool = True) -> 
 
     divided, kernel = case.laws.mapping == "divided", case.laws.kernel_width * diameter
     own = 0.0 if divided else 1.0 / math.sqrt(6.0)
-    sphere = diameter / math.sqrt(20.0) if divided else 0.0
+    sphere = OF_SPHERE * diameter if divided else 0.0
     deviation = max(kernel, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
     width = math.sqrt(12.0) * deviation / diameter
     if width < NARROW_KERNEL:
@@ -131,11 +156,28 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if not (case.bed.fixed or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
         yield from _check_inlet(case, bed)
     jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
+    if jet and ends == "flow" and not case.vessel:
+        yield from _check_jet(case, jet)
     if jet and not (in_a_box or jet.round or jet.depth):
         yield Issue(
             "note", "bed.jet", f"a slot across the whole vessel, {percent(share_of_jet(case, jet))} of its floor",
             "for a nozzle, set bed.jet.round = true; width is then its diameter", False,
         )  # fmt: skip
+
+
+def _check_jet(case: Case, jet: Jet) -> Iterator[Issue]:
+    """Check that the cells of the floor whose middles a jet covers have its area, in a column without a vessel."""
+    grid = grid_of(case)
+    x, y, _ = np.broadcast_arrays(*grid.centres())
+    covered = grid.open[0] & jet.covers(x[0] - 0.5 * case.column.width, y[0] - 0.5 * case.column.size[1])
+    area, nominal = float(covered.sum()) * grid.face_area(2), share_of_jet(case, jet) * case.floor_area
+    remedy = 'give it as a patch of kind = "inlet", whose flow does not depend on cells, or fit it to the cells'
+    if area == 0.0:
+        reason = f"no cell of the floor has its middle within {jet.width:.3g} m, so that nothing would enter"
+        yield Issue("error", "bed.jet.width", reason, remedy)
+    elif abs(area - nominal) > INEXACT_JET * nominal:
+        reason = f"the jet enters through whole cells, {area:.3g} m2; its own area is {nominal:.3g} m2"
+        yield Issue("warning", "bed.jet.width", reason, remedy)
 
 
 def check_wall_drag(case: Case) -> Iterator[Issue]:
