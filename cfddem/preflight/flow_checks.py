@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from cfddem.case.bed import Jet
-from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
-from cfddem.fluid.cell_counts import suggested_cells
+from cfddem.fluid.cell_counts import cell_counts, suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate, share_of_jet
 from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
 from cfddem.preflight.issue import Issue, percent, plain
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wall_checks import MOST_CELLS
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -156,7 +156,7 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if not (case.bed.fixed or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
         yield from _check_inlet(case, bed)
     jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
-    if jet and ends == "flow" and not case.vessel:
+    if jet and ends == "flow" and in_a_box:
         yield from _check_jet(case, jet)
     if jet and not (in_a_box or jet.round or jet.depth):
         yield Issue(
@@ -166,11 +166,14 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 
 
 def _check_jet(case: Case, jet: Jet) -> Iterator[Issue]:
-    """Check that the cells of the floor whose middles a jet covers have its area, in a column without a vessel."""
-    grid = grid_of(case)
-    x, y, _ = np.broadcast_arrays(*grid.centres())
-    covered = grid.open[0] & jet.covers(x[0] - 0.5 * case.column.width, y[0] - 0.5 * case.column.size[1])
-    area, nominal = float(covered.sum()) * grid.face_area(2), share_of_jet(case, jet) * case.floor_area
+    """Check that the cells of a rectangular floor whose middles a jet covers have its area."""
+    size, counts = case.column.size, cell_counts(case.column.size, case.column.cell)
+    if counts[0] * counts[1] > MOST_CELLS:
+        return
+    x, y = ((np.arange(n) + 0.5) * length / n - 0.5 * length for n, length in zip(counts[:2], size))
+    covered = int(np.count_nonzero(jet.covers(*np.meshgrid(x, y))))
+    floor = size[0] * size[1]
+    area, nominal = covered * floor / (counts[0] * counts[1]), share_of_jet(case, jet) * floor
     remedy = 'give it as a patch of kind = "inlet", whose flow does not depend on cells, or fit it to the cells'
     if area == 0.0:
         reason = f"no cell of the floor has its middle within {jet.width:.3g} m, so that nothing would enter"

@@ -35,6 +35,14 @@ def test_no_gallery_case_has_errors(name: str) -> None:
     assert preflight(GALLERY[name]).status in ("ok", "warning"), preflight(GALLERY[name]).issue_lines()
 
 
+def test_a_draft_tube_in_more_cells_than_memory_has_is_refused_in_a_line() -> None:
+    """4e11 cells of the floor: those within the tube are not counted."""
+    result = preflight(GALLERY["wurster"].with_(**{"column.cell": 1.5e-7}))
+    assert result.status == "error" and result.issues[0].remedy
+    assert not any("area by its cells" in row.name for row in result.rows)
+    assert any("area by its cells" in row.name for row in preflight(GALLERY["wurster"]).rows)
+
+
 def test_a_gallery_case_with_a_warning_explains_it() -> None:
     for name in ("liquid-bed", "packed-bed", "sedimentation", "segregation"):
         assert not preflight(GALLERY[name]).issues, preflight(GALLERY[name]).issue_lines()
