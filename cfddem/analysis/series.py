@@ -5,6 +5,7 @@ Pure functions of arrays. Values must be evenly spaced in time; :func:`even` int
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     first, second = np.array_split(rest, 2)
     drift = second.mean() - first.mean()
     # without detrending, a trend within a half would look like a long correlation time and enlarge the error
-    error = float(np.hypot(*(block_average(_less_its_line(half)).error for half in (first, second))))
+    error = math.hypot(*(block_average(_less_its_line(half)).error for half in (first, second)))
     rounding = ROUNDING * float(np.abs(rest).max())
     stationary = cut <= count // 2 and bool(abs(drift) <= limit * error + rounding)
     return Stationarity(stationary, start, float(drift), error)
@@ -170,7 +171,7 @@ def spectrum(values: Array, interval: float, segments: int = 3) -> Spectrum:
     series = np.asarray(values, float)
     if interval <= 0.0 or len(series) < FEWEST:
         raise InputError("values", len(series), f"at least {FEWEST} values at a positive interval")
-    from scipy.signal import welch  # imported here: it takes a fifth of the start of a command
+    from scipy.signal import welch  # imported here: it takes a quarter of the start of a command
 
     length = max(FEWEST, 2 * len(series) // (segments + 1))
     frequency, density = welch(series, 1.0 / interval, nperseg=length, nfft=4 * length, detrend="linear")

@@ -61,10 +61,7 @@ def owner(node: ast.Attribute) -> str:
 
 def test_calls_that_other_systems_lack_are_guarded() -> None:
     found = [
-        f"{path.relative_to(HOME)}: {name}"
-        for path in FILES
-        for node in unguarded(tree(path))
-        for name in names(node)
+        f"{path.relative_to(HOME)}: {name}" for path in FILES for node in unguarded(tree(path)) for name in names(node)
     ]
     assert not found, "\n".join(found)
 
