@@ -39,8 +39,8 @@ OF_A_BLOCK = 4
 
 class Faces(NamedTuple):
     """Faces of one component near walls, in blocks of equally many faces of one plane of the grid; the last block of a
-    plane is filled up with copies of its last face. Blocks of one pattern have the same walls around them: the planes of an
-    upright column have one pattern each. Flat indices of padded fields are unsigned: none counts from the end.
+    plane is filled up with copies of its last face. Blocks of one pattern have the same walls around them: the planes
+    of an upright column have one pattern each. Flat indices of padded fields are unsigned: none counts from the end.
 
     Along each direction e of three there are eight weights: of the face before, the face itself and the next ones away
     from the wall of both in the stress below, and of the face itself, the one behind and the next ones in that above.
