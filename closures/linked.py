@@ -15,6 +15,7 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.environment import lookup_environment
+from numba.core.targetconfig import TargetConfig
 
 
 class _WithoutAddresses:
@@ -25,7 +26,14 @@ class _WithoutAddresses:
         """What a function reads from Python has no address yet; it is set with that of the loop."""
 
 
-class _LinkedCode(JITCodeLibrary):  # type: ignore[misc]
+class _Code(JITCodeLibrary):  # type: ignore[misc]
+    """Code that is optimised once, where it is whole: not each function before it is linked, too."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout  # type: ignore[attr-defined]
+
+
+class _LinkedCode(_Code):
     """Code of a function without machine code."""
 
     inlined = False
@@ -51,7 +59,7 @@ class _LinkedCode(JITCodeLibrary):  # type: ignore[misc]
         return 0
 
 
-class _CalledCode(JITCodeLibrary):  # type: ignore[misc]
+class _CalledCode(_Code):
     """Code of a loop that Python calls, with that of all functions in it."""
 
     def _finalize_specific(self) -> None:
@@ -83,6 +91,7 @@ class Called(Compiler):  # type: ignore[misc]
 REPLACED = (
     "codegen",
     "get_pointer_to_function",
+    "_optimize_functions",
     "_optimize_final_module",
     "_finalize_final_module",
     "_finalize_dynamic_globals",
@@ -105,7 +114,22 @@ def ways(library: type) -> tuple[dict[str, Any], dict[str, Any]]:
     return part, {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": called}
 
 
+def compare_quickly(settings: type) -> None:
+    """Compare settings of a compilation by those that are set.
+
+    The compiler compares them thousands of times for each loop, all fifty with their defaults: a twentieth of its time.
+    """
+    compared: Any = settings.__eq__
+
+    def equals(one: Any, other: Any) -> Any:
+        alike = type(one) is type(other) and hasattr(one, "_values") and one._values == other._values
+        return alike or compared(one, other)
+
+    settings.__eq__ = equals  # type: ignore[method-assign, assignment]
+
+
 PART, CALLED = ways(JITCodeLibrary)
+compare_quickly(TargetConfig)
 
 INLINE: dict[str, Any] = {**PART, "forceinline": True, "_nrt": False}
 """Small functions that are always inlined, and count no references: they own no arrays."""

@@ -166,13 +166,13 @@ def vague(path: Path) -> Iterator[str]:
             yield f"{node.lineno}: {name}"
 
 
-def count(path: Path) -> Count:
-    """Numbers of a file."""
+def count(path: Path, sizes: bool = True) -> Count:
+    """Numbers of a file; those of its lines, which take most of the time, if `sizes`."""
     asked = len(list(questions(path)))
     return Count(
         files=1,
         lines=len(text(path).splitlines()),
-        code=code_lines(text(path)),
+        code=code_lines(text(path)) if sizes else 0,
         questions=asked,
         asking=bool(asked),
         positions=len(list(positions(path))),
@@ -182,12 +182,12 @@ def count(path: Path) -> Count:
 
 
 @cache
-def counts() -> dict[str, Count]:
-    """Numbers of each package, and of the references apart."""
+def counts(sizes: bool = True) -> dict[str, Count]:
+    """Numbers of each package, and of the references apart; with lines of code if `sizes`."""
     found = {name: Count() for name in (*PACKAGES, REFERENCES)}
     for name, path in modules().items():
         package = REFERENCES if f"{name}.".startswith(f"{REFERENCES}.") else name.partition(".")[0]
-        found[package] += count(path)
+        found[package] += count(path, sizes)
     return found
 
 

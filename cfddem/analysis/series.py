@@ -5,11 +5,11 @@ Pure functions of arrays. Values must be evenly spaced in time; :func:`even` int
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend, welch
 
 from cfddem.backend.errors import InputError
 
@@ -118,7 +118,7 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     first, second = np.array_split(rest, 2)
     drift = second.mean() - first.mean()
     # without detrending, a trend within a half would look like a long correlation time and enlarge the error
-    error = float(np.hypot(block_average(detrend(first)).error, block_average(detrend(second)).error))
+    error = math.hypot(*(block_average(_less_its_line(half)).error for half in (first, second)))
     rounding = ROUNDING * float(np.abs(rest).max())
     stationary = cut <= count // 2 and bool(abs(drift) <= limit * error + rounding)
     return Stationarity(stationary, start, float(drift), error)
@@ -143,6 +143,13 @@ def drift_of(time: Array, values: Array) -> tuple[float, float]:
     return drift, float(np.sqrt(12.0)) * block_average(values - drift * since).error
 
 
+def _less_its_line(values: Array) -> Array:
+    """A series less the straight line through it, by least squares."""
+    since = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    fluctuation: Array = values - values.mean()
+    return fluctuation - (since @ fluctuation / max(float(since @ since), 1.0)) * since
+
+
 class Spectrum(NamedTuple):
     """Power spectrum of a fluctuation."""
 
@@ -164,6 +171,8 @@ def spectrum(values: Array, interval: float, segments: int = 3) -> Spectrum:
     series = np.asarray(values, float)
     if interval <= 0.0 or len(series) < FEWEST:
         raise InputError("values", len(series), f"at least {FEWEST} values at a positive interval")
+    from scipy.signal import welch  # imported here: it takes a quarter of the start of a command
+
     length = max(FEWEST, 2 * len(series) // (segments + 1))
     frequency, density = welch(series, 1.0 / interval, nperseg=length, nfft=4 * length, detrend="linear")
     peak = int(np.argmax(density[1:-1])) + 1
@@ -199,7 +208,7 @@ def mean_frequency(values: Array, interval: float, band: float = 0.5) -> MeanFre
     series = np.asarray(values, float)
     if interval <= 0.0 or len(series) < FEWEST:
         raise InputError("values", len(series), f"at least {FEWEST} values at a positive interval")
-    series = detrend(series)
+    series = _less_its_line(series)
     level = band * float(series.std())
     side = np.where(series > level, 1, np.where(series < -level, -1, 0))
     outside = np.flatnonzero(side)

@@ -272,7 +272,7 @@ class Heat(FeatureTable):
             biot = self.nusselt(case, bed) * self.conductivity / (6.0 * of_solid[name])
             if biot > LARGEST_BIOT:
                 reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds_of(case, bed):.3g}"
-                remedy = "temperatures differ within a particle; use smaller particles, or take care"
+                remedy = "take temperatures as means over a particle; its surface is nearer to that of the gas"
                 yield "warning", f"{key}.{name}", f"{reason}; the limit is {LARGEST_BIOT:g}", remedy
 
     def nusselt(self, case: Any, bed: Any) -> float:

@@ -124,14 +124,14 @@ class Grid:
         return 0, 0, 0
 
     def divided(self, parts: tuple[int, int, int]) -> Grid:
-        """The same box with every cell divided along x, y, z into so many."""
+        """The same box with every cell divided along x, y, z into so many, and the same walls."""
         cells: Any = tuple(n * count for n, count in zip(self.cells, parts))
         spacing: Any = tuple(h / count for h, count in zip(self.spacing, parts))
         solid = self.solid
         if solid is not None:
             for axis, count in enumerate(parts):
                 solid = np.repeat(solid, count, axis=2 - axis)
-        return Grid(cells, spacing, self.origin, solid)
+        return Grid(cells, spacing, self.origin, solid, self.walls)
 
     def touches(self, axis: int, high: bool) -> bool:
         """Whether the low or high end of an axis is a side of the box."""

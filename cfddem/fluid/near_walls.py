@@ -33,10 +33,14 @@ LEAST_RISE = 0.4
 """How much farther from the wall the next face must be, for a curvature to be taken, in cells."""
 
 
+OF_A_BLOCK = 4
+"""What a block of faces takes besides, in faces."""
+
+
 class Faces(NamedTuple):
-    """Faces of one component near walls, in blocks of `BLOCK` faces of one plane of the grid; the last block of a plane
-    is filled up with copies of its last face. Blocks of one pattern have the same walls around them: the planes of an
-    upright column have one pattern each. Flat indices of padded fields are unsigned: none counts from the end.
+    """Faces of one component near walls, in blocks of equally many faces of one plane of the grid; the last block of a
+    plane is filled up with copies of its last face. Blocks of one pattern have the same walls around them: the planes
+    of an upright column have one pattern each. Flat indices of padded fields are unsigned: none counts from the end.
 
     Along each direction e of three there are eight weights: of the face before, the face itself and the next ones away
     from the wall of both in the stress below, and of the face itself, the one behind and the next ones in that above.
@@ -44,15 +48,15 @@ class Faces(NamedTuple):
     """
 
     axis: int
-    place: Any  # (blocks, BLOCK) the faces, less two planes
+    place: Any  # (blocks, width) the faces, less two planes
     pattern: Any  # (blocks,)
-    share: Array  # (patterns, BLOCK) of the momentum cell that is open
-    weight: Array  # (patterns, 3, 8, BLOCK) of velocities in the gradients [1/m2]
-    constant: Array  # (patterns, 3, 2, BLOCK) the part that walls which slide add [1/m/s]; no patterns if none does
-    next: Any  # (patterns, 3, 2, BLOCK) next faces away from the wall, less `place`: of the face before, the one behind
-    farther: Any  # (patterns, BLOCK) the next face away from the wall, less `place`
-    pull: Array  # (patterns, 3, BLOCK) of the wall: weights of the face and that next one [1/m2], a constant [1/m/s]
-    stiff_at: Any  # (m,) the faces with a stress that is stiffer than in a whole cell
+    share: Array  # (patterns, width) of the momentum cell that is open
+    weight: Array  # (patterns, 3, 8, width) of velocities in the gradients [1/m2]
+    constant: Array  # (patterns, 3, 2, width) the part that walls which slide add [1/m/s]; no patterns if none does
+    next: Any  # (patterns, 3, 2, width) next faces away from the wall, less `place`: of the face before, the one behind
+    farther: Any  # (patterns, width) the next face away from the wall, less `place`
+    pull: Array  # (patterns, 3, width) of the wall: weights of the face and that next one [1/m2], a constant [1/m/s]
+    stiff_at: Any  # (m,) less two planes, the faces with a stress that is stiffer than in a whole cell
     stiff: Array  # (m,) how much stiffer, over the own velocity [1/m2]
     inverse: Array  # (3,) 1/spacing [1/m]
 
@@ -115,7 +119,7 @@ class NearWalls(NoWalls):
         """See `NoWalls.add_held`."""
         fields = self.fields
         for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
-            at = faces.stiff_at.astype(np.int64)
+            at = faces.stiff_at.astype(np.int64) + 2 * fields.drag.shape[1] * fields.drag.shape[2]
             old, stage, new = (
                 field[d].ravel()[at] for field in (fields.other_velocity, fields.stage_velocity, fields.velocity)
             )
@@ -188,19 +192,23 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
 
     return Faces(
         d, place.astype(np.uint32)[fill], pattern, of_patterns(acting), of_patterns(weight),
-        of_patterns(constant) if constant.any() else np.zeros((0, 3, 2, BLOCK)), of_patterns(further),
-        of_patterns(beside), of_patterns(pull), at[is_stiff].astype(np.uint32), stiff[is_stiff], inverse,
+        of_patterns(constant) if constant.any() else np.zeros((0, 3, 2, fill.shape[1])), of_patterns(further),
+        of_patterns(beside), of_patterns(pull), place[is_stiff].astype(np.uint32), stiff[is_stiff], inverse,
     )  # fmt: skip
 
 
 def _in_blocks(planes: Any) -> Any:
-    """Numbers of faces in blocks (blocks, BLOCK), each of one plane."""
+    """Numbers of faces in blocks (blocks, width), each of one plane, of the width that leaves the fewest to fill up."""
     begins = np.flatnonzero(np.diff(planes, prepend=-1))
-    blocks = []
-    for begin, end in zip(begins, [*begins[1:], planes.size]):
-        count = -(-(end - begin) // BLOCK) * BLOCK
-        blocks.append(np.minimum(np.arange(begin, begin + count), end - 1).reshape(-1, BLOCK))
-    return np.concatenate(blocks) if blocks else np.zeros((0, BLOCK), np.int64)
+    counts = np.diff(begins, append=planes.size)
+    widths = np.arange(8, BLOCK + 1, 8)
+    work = [(-(-counts // width)).sum() * (width + OF_A_BLOCK) for width in widths]
+    width = int(widths[np.argmin(work)])
+    blocks = [
+        np.minimum(np.arange(begin, begin - (-count // width) * width), begin + count - 1).reshape(-1, width)
+        for begin, count in zip(begins, counts)
+    ]
+    return np.concatenate(blocks) if blocks else np.zeros((0, width), np.int64)
 
 
 def _patterns(values: Sequence[Array], fill: Any) -> tuple[Any, Any]:

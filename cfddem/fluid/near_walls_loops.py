@@ -17,7 +17,7 @@ EMPTY = 0.01
 """As `FULL`, for the change of the fluid that the cell holds."""
 
 BLOCK = 64
-"""Faces that are computed together."""
+"""Most faces that are computed together."""
 
 
 @threaded
@@ -38,8 +38,9 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
     """
     steps = strides(viscosity.shape)
     u, mu, out, flux = velocity.reshape(-1), viscosity.reshape(-1), rate.reshape(-1), flux.reshape(3, -1)
+    width = faces.place.shape[1]
     for block in prange(len(faces.place)):
-        pattern, terms, sums = faces.pattern[block], np.empty((8, BLOCK)), np.zeros((3, BLOCK))
+        pattern, terms, sums = faces.pattern[block], np.empty((8, width)), np.zeros((3, width))
         _gather(faces, block, pattern, steps, u, mu, terms)
         for e in range(3):
             if e == faces.axis:
@@ -49,7 +50,7 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
             _balance(faces, (block, pattern, e), steps, u, central, terms, sums)
         _per_volume(faces, pattern, terms, density, sums)
         place, within = faces.place[block], out[2 * steps[2] :]
-        for i in range(BLOCK):
+        for i in range(width):
             within[place[i]] = sums[0, i]
 
 
@@ -143,30 +144,39 @@ def hold_near_walls(faces, viscosity, voidage, velocities, mobility, resistance,
     fluid       its density [kg/m3], and 1 in model B
     step        [s], and the weight of the stress of the stage before, 0 in the first stage
     """
+    steps = strides(voidage.shape)
+    back, first = steps[faces.axis], 2 * steps[2]
     old, stage, new = velocities
-    old, stage, new, mobility = old.reshape(-1), stage.reshape(-1), new.reshape(-1), mobility.reshape(-1)
-    mu, eps, back = viscosity.reshape(-1), voidage.reshape(-1), strides(voidage.shape)[faces.axis]
+    old, stage, new = old.reshape(-1)[first:], stage.reshape(-1)[first:], new.reshape(-1)[first:]
+    mobility, mu, eps = mobility.reshape(-1)[first:], viscosity.reshape(-1), voidage.reshape(-1)
     count = faces.stiff_at.size
     for block in prange((count + BLOCK - 1) // BLOCK):
         begin, end = block * BLOCK, min((block + 1) * BLOCK, count)
         at, of_block, results = faces.stiff_at[begin:end], resistance[begin:end], np.empty((2, end - begin))
         if step[1] == 0.0:  # both stages have the same mobility, and with it the same pressure equation
-            stiff = faces.stiff[begin:end]
-            for i in range(at.size):
-                of_block[i] = stiff[i] * (0.5 * (mu[at[i]] + mu[at[i] - back]))
-        _held(at, (eps, back), (old, stage, new, mobility), of_block, fluid, step, results)
+            _resist(at, faces.stiff[begin:end], mu[first - back :], mu[first:], of_block)
+        fields = eps[first - back :], eps[first:], old, stage, new, mobility
+        _held(at, fields, of_block, fluid, step, results)
         for i in range(at.size):
             new[at[i]], mobility[at[i]] = results[0, i], results[1, i]
 
 
 @vector_inline
-def _held(at, voidage, faces, resistance, fluid, step, results):
+def _resist(at, stiff, mu_left, mu_right, resistance):
+    """Write the resistance of a block."""
+    for i in range(at.size):
+        p = at[i]
+        resistance[i] = stiff[i] * (0.5 * (mu_right[p] + mu_left[p]))
+
+
+@vector_inline
+def _held(at, fields, resistance, fluid, step, results):
     """Write velocity and mobility of a block."""
-    (eps, back), (old, stage, new, mobility), (density, model_b), (step, weight) = voidage, faces, fluid, step
+    (eps_left, eps_right, old, stage, new, mobility), (density, model_b), (step, weight) = fields, fluid, step
     velocity, lost = results
-    for i in range(velocity.size):
+    for i in range(at.size):
         p, stiffness = at[i], resistance[i]
-        at_face, before, moved = 0.5 * (eps[p] + eps[p - back]), old[p], mobility[p]
+        at_face, before, moved = 0.5 * (eps_right[p] + eps_left[p]), old[p], mobility[p]
         explicit = (1.0 - weight) * before + weight * stage[p]  # as the explicit stress, of both stages
         theta = implicitness(stiffness * step / (density * at_face))
         loose = step * (at_face + model_b * (1.0 - at_face))

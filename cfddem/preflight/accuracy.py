@@ -93,9 +93,10 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
     other = ", with smeared surfaces" if sharp else ""
     for figure in LIQUID if case.in_liquid else GAS:
         yield figure.name, figure.value, "", figure.note + other
-    if case.in_liquid and case.laws.kernel_width != 1.5:
+    own = case.laws.kernel_width
+    if case.in_liquid and own != 1.5 and BY_KERNEL[0][0] <= own <= BY_KERNEL[-1][0]:
         note = f"over 1.5 d, glass beads{other}"
-        yield "this kernel: granular temperature", between(BY_KERNEL, case.laws.kernel_width), "", note
+        yield "this kernel: granular temperature", between(BY_KERNEL, own), "", note
 
 
 def _is_no_plain_bed(case: Case) -> bool:

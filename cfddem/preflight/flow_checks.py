@@ -7,19 +7,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cfddem.case.bed import Jet
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
-from cfddem.fluid.cell_counts import suggested_cells
+from cfddem.fluid.cell_counts import cell_counts, suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate, share_of_jet
 from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
 from cfddem.preflight.issue import Issue, percent, plain
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wall_checks import MOST_CELLS
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
 
 Below the first, a sphere has more volume than its kernel can hold; below the second, the voidage is poor [-].
 """
+
+OF_SPHERE = 1.0 / math.sqrt(20.0)
+"""Standard deviation of the volume of a sphere along a line, over the diameter; a narrower kernel is none [-]."""
 
 FINEST = 6.0
 """More cells than this per standard deviation of the kernel cost time and resolve nothing more [-]."""
@@ -29,6 +34,9 @@ FEWEST_DIAMETERS = 2.0
 
 UNEQUAL = 1.2
 """Ratio of species diameters from which a drag law should depend on the diameter ratio [-]."""
+
+INEXACT_JET = 0.1
+"""Difference between the flow of a jet and that through the cells that it covers, over the first, for a warning [-]."""
 
 FEWEST_CELLS = 4.0
 """Fewest cells over the height of a fluidised bed and over the wider side of its column [-]."""
@@ -40,6 +48,23 @@ PROFILE_RANGE = 2.0
 def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
     """Check that the filter kernel is wide enough for a particle, and the cells not needlessly small."""
     assert steps.cells is not None
+    width, widest = case.laws.kernel_width, max(case.column.size[:2])
+    across = 2.0 * width * case.bed.largest_diameter
+    if 0.0 < width < OF_SPHERE:
+        yield Issue(
+            "warning", "laws.kernel_width",
+            f"{width:.3g} diameters is narrower than a sphere, whose volume has a standard deviation of "
+            f"{OF_SPHERE:.2g}: it filters nothing",
+            "use 1.5, the default, or 0 for no kernel",
+        )  # fmt: skip
+        return
+    if across > widest and not case.is_one_sphere:
+        yield Issue(
+            "warning", "laws.kernel_width",
+            f"{width:.3g} diameters on both sides, {across:.2g} m, is more than the column is wide, {widest:.3g} m",
+            "use 1.5, the default, or a wider column",
+        )  # fmt: skip
+        return
     spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
     yield from _check_smallest_cell(case, min(spacing, default=min(case.column.size)))
 
@@ -65,7 +90,7 @@ def _check_smallest_cell(case: Case, smallest: float, suggests: bool = True) -> 
 
     divided, kernel = case.laws.mapping == "divided", case.laws.kernel_width * diameter
     own = 0.0 if divided else 1.0 / math.sqrt(6.0)
-    sphere = diameter / math.sqrt(20.0) if divided else 0.0
+    sphere = OF_SPHERE * diameter if divided else 0.0
     deviation = max(kernel, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
     width = math.sqrt(12.0) * deviation / diameter
     if width < NARROW_KERNEL:
@@ -131,11 +156,31 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if not (case.bed.fixed or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
         yield from _check_inlet(case, bed)
     jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
+    if jet and ends == "flow" and in_a_box:
+        yield from _check_jet(case, jet)
     if jet and not (in_a_box or jet.round or jet.depth):
         yield Issue(
             "note", "bed.jet", f"a slot across the whole vessel, {percent(share_of_jet(case, jet))} of its floor",
             "for a nozzle, set bed.jet.round = true; width is then its diameter", False,
         )  # fmt: skip
+
+
+def _check_jet(case: Case, jet: Jet) -> Iterator[Issue]:
+    """Check that the cells of a rectangular floor whose middles a jet covers have its area."""
+    size, counts = case.column.size, cell_counts(case.column.size, case.column.cell)
+    if counts[0] * counts[1] > MOST_CELLS:
+        return
+    x, y = ((np.arange(n) + 0.5) * length / n - 0.5 * length for n, length in zip(counts[:2], size))
+    covered = int(np.count_nonzero(jet.covers(*np.meshgrid(x, y))))
+    floor = size[0] * size[1]
+    area, nominal = covered * floor / (counts[0] * counts[1]), share_of_jet(case, jet) * floor
+    remedy = 'give it as a patch of kind = "inlet", whose flow does not depend on cells, or fit it to the cells'
+    if area == 0.0:
+        reason = f"no cell of the floor has its middle within {jet.width:.3g} m, so that nothing would enter"
+        yield Issue("error", "bed.jet.width", reason, remedy)
+    elif abs(area - nominal) > INEXACT_JET * nominal:
+        reason = f"the jet enters through whole cells, {area:.3g} m2; its own area is {nominal:.3g} m2"
+        yield Issue("warning", "bed.jet.width", reason, remedy)
 
 
 def check_wall_drag(case: Case) -> Iterator[Issue]:
@@ -148,7 +193,17 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
         if wall.shape in ("surface", "plate") or wall.moves:
             reason = f"is a {wall.shape}" if wall.shape in ("surface", "plate") else "moves"
             yield Issue("error", "laws.wall_drag", f"wall.{number} {reason}", 'set laws.wall_drag = "none"')
+    if case.vessel and case.vessel.shape == "surface":
+        reason = "the vessel is a surface from a file"
+        yield Issue("error", "laws.wall_drag", reason, 'set laws.wall_drag = "none"')
     column = case.column
+    if case.has_fluid and (case.line or case.vessel or any(case.closes_cells(wall) for wall in case.wall)):
+        yield Issue(
+            "warning", "laws.wall_drag",
+            "beside the wall of a vessel, a round column or a wall with solid cells the grid slows the flow, too: a "
+            "single sphere there has up to 8 % too much drag",
+            'expect it there, or set laws.wall_drag = "none"',
+        )  # fmt: skip
     pairs = column.ends, column.sides, column.sides if column.front is None else column.front
     faces = 2 * sum(pair != "periodic" for pair in pairs) + len(case.wall)
     if case.laws.wall_drag == "all" and case.has_fluid and faces > 1:

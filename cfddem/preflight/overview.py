@@ -21,7 +21,7 @@ from cfddem.preflight.accuracy import accuracy
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate
-from cfddem.preflight.wall_checks import area_by_cells, closed_cells, largest_rate
+from cfddem.preflight.wall_checks import MOST_CELLS, area_by_cells, closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 from closures.bed import ergun_gradient
@@ -165,11 +165,12 @@ def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
 
 
 def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
-    group = "walls and feeds"
+    group, counts = "walls and feeds", cell_counts(case.column.size, case.column.cell)
     for number, wall in enumerate(case.wall):
         if wall.shape == "surface":
             yield Row(group, f"wall {number}: triangles", *_surface(wall))
-        if wall in case.thin_walls and wall.is_open and wall.axis[:2] == (0.0, 0.0):
+        upright = wall.is_open and wall.axis[:2] == (0.0, 0.0)
+        if wall in case.thin_walls and upright and counts[0] * counts[1] <= MOST_CELLS:
             note = "over the true one, half way up: the fluid sees steps; choose a radius that has it near 1"
             yield Row(group, f"wall {number}: area by its cells", area_by_cells(case, wall), "", note)
         if wall.moves and math.isfinite(wall.fastest):
@@ -179,7 +180,7 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
-    if case.has_fluid and case.vessel and math.prod(cell_counts(case.column.size, case.column.cell)) <= MOST_CUT:
+    if case.has_fluid and case.vessel and math.prod(counts) <= MOST_CUT:
         yield from _cut_cells(case, group)
     if (vessel := vessel_of(case)) is not None:
         yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")

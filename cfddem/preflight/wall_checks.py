@@ -41,7 +41,7 @@ FEWEST_ACROSS = 4.0
 """Cells across a thin tube, below which its flow has no profile [-]."""
 
 MOST_CELLS = 5_000_000
-"""Cells above which the pre-run check does not look for those that walls close."""
+"""Cells above which the pre-run check does not count those that walls close or surround, and those above a jet."""
 
 MOST_LEAKS, BETWEEN, LEAKS = 200_000, 8, 0.25
 """The check does not look for walls thinner than a cell above so many cells. It looks at so many places between the

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.case.column_grid import grid_of
 from cfddem.case.patch_faces import face_at, patch_faces
+from cfddem.case.patches import PLANES
 from cfddem.case.schema import Case
 from cfddem.fluid.conditions import Condition, Inlet, NoSlip, Outlet
-from cfddem.fluid.grid import Array, Region
+from cfddem.fluid.grid import Array, Region, layers
 
 
 def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Condition | list[Condition]:
@@ -27,9 +29,14 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
     if not of_side.patches:
         return base
     listed = base if isinstance(base, list) else [base]
-    if any(patch.shape == "whole" and not patch.brings for patch in of_side.patches.values()):
+    flow, inlets = _before(listed[0]), of_side.inlets
+    entering = np.sum([of_side.shares[name] for name in inlets], axis=0) > 0.0
+    covered = entering | np.any([of_side.whole(name) for name in of_side.patches if name not in inlets], axis=0)
+    axis, high = PLANES[side]
+    replaced = any(patch.shape == "whole" and not patch.brings for patch in of_side.patches.values())
+    if replaced or np.all(covered | ~grid_of(case).open[layers(axis, -1 if high else 0)]):
         listed = [NoSlip()]  # nothing of the side itself is left
-    conditions, inlets = [*listed], of_side.inlets
+    conditions = [*listed]
     for name, patch in of_side.patches.items():
         if not patch.brings:
             where = _at(case, side, of_side.whole(name))
@@ -38,8 +45,7 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
             )
         elif name == inlets[-1]:  # all inlets at once: two may share a face
             speeds = [(of_side.patches[one].speed, of_side.shares[one]) for one in inlets]
-            entering = np.sum([share for _, share in speeds], axis=0) > 0.0
-            velocity = _velocity(case, side, speeds, _before(listed[0]), of_side.rest)
+            velocity = _velocity(case, side, speeds, flow, of_side.rest)
             conditions.append(Inlet(velocity, where=_at(case, side, entering)))
     return conditions
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cfddem.backend.compile import inline, part, prange, serial, threaded_part, use_threads
+from closures.linked import compare_quickly
 
 pytestmark = pytest.mark.skipif(not hasattr(inline(lambda x: x), "signatures"), reason="compilation is switched off")
 
@@ -144,3 +145,20 @@ def test_a_version_without_the_replaced_parts_gives_the_same_numbers(replaced: b
         [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     assert done.stdout.strip() == sum(np.sqrt(1.0 + np.arange(5.0))).hex(), done.stderr
+
+
+def test_settings_are_compared_by_what_is_set_and_else_as_the_compiler_does() -> None:
+    class Settings:
+        asked = 0
+
+        def __init__(self, **values: int) -> None:
+            if values:
+                self._values = values
+
+        def __eq__(self, other: object) -> bool:
+            Settings.asked += 1
+            return self.__dict__ == other.__dict__
+
+    compare_quickly(Settings)
+    assert Settings(level=3) == Settings(level=3) and Settings.asked == 0
+    assert Settings(level=3) != Settings(level=2) and Settings() == Settings() and Settings.asked == 2

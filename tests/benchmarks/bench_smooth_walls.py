@@ -32,16 +32,20 @@ def main() -> None:
     column = within(box, cylinder((middle, middle, 0.0), middle))
     ends = {"z_low": Inlet(0.5), "z_high": Outlet()}
     fluids = [FluidSolver(grid, ends, density=1.2, viscosity=1.8e-5) for grid in (box, column)]
-    ratios = []
+    ratios, iterations = [], []
     for n in range(steps + 5):
-        seconds = []
+        seconds, counts = [], []
         for fluid in fluids:
             begin = time.process_time()
-            fluid.step(STEP)
+            report = fluid.step(STEP)
             seconds.append(time.process_time() - begin)
+            counts.append(sum(report.pressure_iterations))
         if n >= 5:
             ratios.append(seconds[1] / seconds[0])
+            iterations.append(counts)
     ratio, wet = statistics.median(ratios), float(open_share(column).astype(bool).mean())
+    of_box, of_column = (statistics.mean(counts) for counts in zip(*iterations))
+    print(f"pressure iterations of a step: {of_box:.1f} in the box, {of_column:.1f} in the column")
     print(f"a step of the column takes {ratio:.2f} of one of the box; a wet cell {ratio / wet:.2f} (limit {LIMIT})")
 
 

@@ -267,6 +267,14 @@ def test_a_mass_flow_enters_exactly_also_where_no_face_follows_the_edge(patch, a
         made(patch={"nozzle": flow | patch | {"velocity": 1.0}})
 
 
+def test_patches_may_cover_every_cell_of_the_floor():
+    """A disc and the ring around it: nothing is left to the inlet of the floor itself, which is no error."""
+    disc = {"kind": "inlet", "shape": "disc", "diameter": 0.02, "velocity": 12.0}
+    ring = {"kind": "inlet", "shape": "ring", "diameter": 0.06, "inner_diameter": 0.02, "velocity": 1.0}
+    case = made(patch={"nozzle": disc, "annulus": ring}, vessel={"shape": "cylinder", "radius": 0.03})
+    assert inflow(case) == pytest.approx(0.25 * math.pi * (12.0 * 0.02**2 + 0.06**2 - 0.02**2), rel=0.01)
+
+
 @pytest.mark.parametrize("profile", ["uniform", "parabolic"])
 def test_the_speed_of_a_mass_flow_through_a_disc_beyond_a_side_is_that_at_its_faces(profile):
     """A disc of 23.7 mm, 3 mm from a side of a box; its highest speed at a face is that of the check."""

@@ -24,7 +24,7 @@ from cfddem.io.reading import open_run
 LIMITS = workers.Limits(seconds=0.2)
 
 
-@pytest.mark.parametrize("count", [400, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [200, pytest.param(2000, marks=pytest.mark.slow)])
 def test_mutated_inputs_are_accepted_or_refused_in_clear_lines(count: int, tmp_path: Path) -> None:
     """Exit code 0 of the command says that there was no traceback, no hang and no unclear answer."""
     command = [sys.executable, "-m", "tests.fuzz", "--count", str(count), "--workers", "1", "--nice", "0", "--output"]

@@ -127,8 +127,8 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "part",
     [
-        study.gap_histories, study.gondret, checks.film_zone, checks.tables,
-        *(pytest.param(part, marks=pytest.mark.slow) for part in (study.roughness, checks.walls)),
+        study.gap_histories, study.gondret, checks.film_zone,
+        *(pytest.param(part, marks=pytest.mark.slow) for part in (study.roughness, checks.walls, checks.tables)),
     ],
     ids=lambda part: part.__name__,
 )  # fmt: skip

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import closures
+from closures.linked import CALLED
 from closures.registry import REGISTRY, Law, law_of
 
 for _module in pkgutil.iter_modules(closures.__path__):
@@ -67,7 +68,7 @@ def test_compiled_law_equals_the_interpreted_law(law: Law) -> None:
     arguments = ", ".join(names)
     scope = {"law": law.function}
     exec(f"def call({arguments}):\n    return law({arguments})", scope)
-    compiled = njit(error_model="numpy")(scope["call"])
+    compiled = njit(**CALLED)(scope["call"])
     random = np.random.default_rng(len(law.name))
     for _ in range(200):
         values = [plausible(name, random) for name in names]

@@ -73,7 +73,7 @@ def test_a_bridge_dries_at_the_rate_of_its_meniscus_and_cools_both_beads() -> No
 
 
 def test_a_dry_bridge_breaks_and_all_water_has_gone() -> None:
-    simulation = Simulation(doublet(liquid__thickness=1e-7))
+    simulation = Simulation(doublet(liquid__thickness=2e-8))
     simulation.step()
     now = row(simulation)
     water, first = now["liquid_on_particles"] + now["liquid_in_bridges"], now["evaporated_mass"]

@@ -58,6 +58,7 @@ def test_heat_is_conserved_in_a_closed_box_and_stays_between_what_it_was(steps: 
     assert lost < 1e-12 and outside < 1e-9 and abs(received) > 1e-3
 
 
+@pytest.mark.slow  # as plain tests: the fluid, its pressure, the coupling and particles on all threads
 def test_the_cells_have_the_same_bits_on_two_threads() -> None:
     """The step of the scalar, of the same flow."""
     found = []

@@ -31,7 +31,7 @@ class Limits:
     memory: float = 4.0  # address space [GB]
     niceness: int = 19
     compiles: bool = True  # otherwise a command ends where it would compile a loop
-    patience: float = 6.0  # a worker that is silent for so many times `seconds` is killed: it sleeps, or is starved
+    patience: float = 6.0  # a worker that sleeps and is silent for so many times `seconds` is killed
 
 
 @dataclass
@@ -96,8 +96,11 @@ def work(pipe: Any, home: str, seed: int, limits: Limits) -> None:
     logging.disable()
     around = Surroundings(Path(home), limits.compiles)
     limit_memory(limits)
+    pipe.send(None)  # from here on time counts: to import the package takes long on a busy machine
     while (number := pipe.recv()) is not None:
         begun = time.process_time()
+        most = math.ceil(begun + 3.0 * limits.seconds)  # of a compiled loop, which the limit of the trial does not end
+        resource.setrlimit(resource.RLIMIT_CPU, (most, resource.RLIM_INFINITY))
         pipe.send((number, trial(around, seed, number, limits), time.process_time() - begun))
 
 
@@ -116,11 +119,26 @@ class Worker:
         self.process.start()
         other.close()
         self.number: int | None = None
-        self.since = time.monotonic()
+        self.since = math.inf  # until it is ready
+
+    def answer(self) -> tuple[int, str, float] | None:
+        """What it says: number, answer and time of a trial, or None once it is ready; EOFError if it has died."""
+        said: tuple[int, str, float] | None = self.pipe.recv()
+        if said is None:
+            self.since = time.monotonic()
+        return said
+
+    @property
+    def silent(self) -> float:
+        """How long it has been silent [s]; 0 before it is ready, and while it computes or waits for a processor."""
+        if not self.process.is_alive():
+            return 0.0  # the end of its pipe says so
+        state = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()[0]
+        return 0.0 if state == "R" else max(0.0, time.monotonic() - self.since)
 
     def send(self, number: int | None) -> None:
         """Give the worker a trial."""
-        self.number, self.since = number, time.monotonic()
+        self.number, self.since = number, self.since if math.isinf(self.since) else time.monotonic()
         self.pipe.send(number)
 
     def replace(self) -> str:
@@ -147,24 +165,26 @@ def many(
         for pipe in wait(list(busy), timeout=1.0):
             worker = busy[pipe]  # type: ignore[index]
             try:
-                answer = pipe.recv()  # type: ignore[union-attr]
+                answer = worker.answer()
             except EOFError:
                 worker.process.join(5)
                 del busy[pipe]  # type: ignore[arg-type]
                 assert worker.number is not None
-                yield worker.number, f"worker {worker.replace()}", time.monotonic() - worker.since
+                yield worker.number, f"worker {worker.replace()}", 0.0
             else:
+                if answer is None:
+                    continue
                 yield answer
                 del busy[pipe]  # type: ignore[arg-type]
             if time.monotonic() < end and _give(worker, waiting):
                 busy[worker.pipe] = worker
         for pipe, worker in list(busy.items()):
-            silent = time.monotonic() - worker.since
+            silent = worker.silent
             if silent > limits.patience * limits.seconds:
                 del busy[pipe]
                 assert worker.number is not None
                 yield worker.number, f"worker {worker.replace()}", silent
-                if _give(worker, waiting):
+                if time.monotonic() < end and _give(worker, waiting):
                     busy[worker.pipe] = worker
     for worker in team:
         worker.process.kill()

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from house import HOME, modules, tree
 
 from cfddem.io import files
 
-HOME = Path(__file__).parents[2]
-FILES = [path for package in ("cfddem", "closures", "scenarios") for path in sorted((HOME / package).rglob("*.py"))]
+FILES = [*modules().values()]
 
 POSIX_ONLY = {"fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "posix", "syslog"}
 """Modules that Windows lacks."""
@@ -61,10 +61,7 @@ def owner(node: ast.Attribute) -> str:
 
 def test_calls_that_other_systems_lack_are_guarded() -> None:
     found = [
-        f"{path.relative_to(HOME)}: {name}"
-        for path in FILES
-        for node in unguarded(ast.parse(path.read_text(encoding="utf-8")))
-        for name in names(node)
+        f"{path.relative_to(HOME)}: {name}" for path in FILES for node in unguarded(tree(path)) for name in names(node)
     ]
     assert not found, "\n".join(found)
 
@@ -80,7 +77,7 @@ def test_texts_are_read_and_written_as_utf_8() -> None:
     """The default encoding of Windows is another one."""
     found = []
     for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 given = {each.arg for each in node.keywords}
                 if node.func.attr in ("read_text", "write_text") and "encoding" not in given:

@@ -86,7 +86,7 @@ def test_the_pull_is_the_law_at_every_gap_and_nothing_else() -> None:
 @pytest.mark.parametrize(("film", "tangential"), [("deforming", "davis"), slow("static", "nase")])
 def test_resistances_are_those_of_the_laws(film: str, tangential: str) -> None:
     """Rates of the velocities along and across over a time that is short for both; and the spin that goes with it."""
-    run, _ = pair(0.0, FILM, viscosity=2.0, film=film, tangential=tangential, pull="constant")
+    run, _ = pair(0.0, FILM, viscosity=2.0, film=film, tangential=tangential, cut="constant", minimum_gap=1e-6)
     made, span, reduced = run.particles, 1e-12, 0.5 * RADIUS
     made.velocity[:] = [[0.2, 0.3, 0.0], [0.0, 0.0, 0.0]]
     run.advance(span)
@@ -94,7 +94,7 @@ def test_resistances_are_those_of_the_laws(film: str, tangential: str) -> None:
     along = lubrication.film_strength(2.0, reduced) * share / FILM
     law = {"davis": bridge.davis_tangential, "nase": bridge.nase_tangential}[tangential]
     across = law(2.0, reduced, FILM, 2.0 * FILM)
-    pull = bridge.constant_capillary(TENSION, reduced)
+    pull = capillary.pendular_pull(TENSION, ANGLE, reduced, LIQUID, FILM)
     force = (made.velocity[0] - [0.2, 0.3, 0.0]) / (span * made.inverse_mass[0])
     assert force == pytest.approx([pull - 0.2 * along, -0.3 * across, 0.0], rel=1e-5)
     torque = made.spin[0, 2] / (span * made.inverse_inertia[0])

@@ -89,7 +89,7 @@ def test_a_resumed_feed_and_outlet_continue_with_the_same_bits(tmp_path: Path) -
         sphere = make_particles([[0.0, 0.0, 0.02]], 0.5 * DIAMETER, 2500.0)
         run = ParticleSolver(sphere, pair_table([GRAIN]), gravity=(0.0, 0.0, -9.81))
         feed = Feed(
-            8e4, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n, draw: normal(n, 1e-3, 2e-4, draw), 2500.0, seed=1
+            2e4, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n, draw: normal(n, 1e-3, 2e-4, draw), 2500.0, seed=1
         )
         return run, feed, ParticleOutlet(low=(-np.inf, -np.inf, 0.0199))
 

@@ -41,7 +41,7 @@ def largest_change(pair: Pair, laws: Laws, step: float, chunks: int, steps: int)
 
     |v| is the faster of the centre and the surface.
     """
-    run = pair.simulation(laws)
+    run = pair.simulation(laws, record=laws.film)  # the loops of recorded collisions, which other tests share
     surface = run.particles.radius * np.linalg.norm(run.particles.spin, axis=1)
     size = run.particles.mass * np.maximum(np.linalg.norm(run.particles.velocity, axis=1), surface)
     linear, angular = momentum(run.particles), angular_momentum(run.particles)

@@ -53,7 +53,7 @@ KINDS: dict[str, tuple[Wall, Any, Any]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "mesh")) for kind in KINDS])
 def test_a_wall_pulls_as_a_sphere_of_infinite_radius(kind: str) -> None:
     """R* = R, half of the liquid of the sphere; it breaks at its rupture length, and the sphere gets all back."""
     wall, place, normal = KINDS[kind]

@@ -51,8 +51,8 @@ def shown(case: Case) -> dict[str, tuple[float, str]]:
         (glass(0.037), {"laws.kernel_width": 0.0}, "smeared", "smeared, the default without a kernel"),
         (glass(0.037), {"laws.drag": "none"}, "smeared", None),
         (glass(0.037), {"bed.count": 1}, "smeared", None),
-        (glass(0.037), VESSEL, "smeared", "smeared, the default in a vessel"),
-        (glass(0.037), THIN_WALL, "smeared", "smeared, the default beside thin walls"),
+        (glass(0.037), VESSEL, "sharp", "sharp, the default in a liquid"),
+        (glass(0.037), THIN_WALL, "sharp", "sharp, the default in a liquid"),
         (mueller(), {}, "smeared", None),
     ],
 )

@@ -35,6 +35,14 @@ def test_no_gallery_case_has_errors(name: str) -> None:
     assert preflight(GALLERY[name]).status in ("ok", "warning"), preflight(GALLERY[name]).issue_lines()
 
 
+def test_a_draft_tube_in_more_cells_than_memory_has_is_refused_in_a_line() -> None:
+    """4e11 cells of the floor: those within the tube are not counted."""
+    result = preflight(GALLERY["wurster"].with_(**{"column.cell": 1.5e-7}))
+    assert result.status == "error" and result.issues[0].remedy
+    assert not any("area by its cells" in row.name for row in result.rows)
+    assert any("area by its cells" in row.name for row in preflight(GALLERY["wurster"]).rows)
+
+
 def test_a_gallery_case_with_a_warning_explains_it() -> None:
     for name in ("liquid-bed", "packed-bed", "sedimentation", "segregation"):
         assert not preflight(GALLERY[name]).issues, preflight(GALLERY[name]).issue_lines()
@@ -174,6 +182,15 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             "0.004 m is 1.3 times the diameter; averages over cells below 2",
         ),
         ({"column.cell": 0.003}, "error", "column.cell", "0.00666667 m fits along x, y and z"),
+        ({"laws.kernel_width": 0.1}, "warning", "laws.kernel_width", "filters nothing"),
+        ({"laws.kernel_width": 30.0}, "warning", "laws.kernel_width", "more than the column is wide, 0.04 m"),
+        (
+            {"bed.jet": {"width": 1e-3, "velocity": 0.2}, "column.width": 0.032},
+            "error",
+            "bed.jet.width",
+            "no cell of the floor",
+        ),
+        ({"bed.jet": {"width": 0.02, "velocity": 0.2}}, "warning", "bed.jet.width", "0.00096 m2; its own area"),
         ({"column.cell": 0.00025}, "warning", "column.cell", "of the kernel width"),
         ({"column.cell": 0.0005}, "warning", "column.cell", "of the kernel width"),
         ({"fluid.density": 0.997}, "warning", "fluid.density", "that of a gas"),

@@ -1,7 +1,6 @@
 """Wet gas beds from a case: liquid budget, spray, measures, and continuing from a checkpoint.
 
-The bed has more than 1 000 particles, so that its loops are those for all threads. Its laws are those of other tests
-of bridges, which share their loops.
+Its bridges have the laws of a case that names none.
 """
 
 from __future__ import annotations
@@ -51,8 +50,6 @@ inlet_velocity = 0.6
 [liquid]
 viscosity = 5e-3
 surface_tension = 0.02
-pull = "pendular"
-film = "deforming"
 liquid_fraction = 0.002
 share_of_wet_particles = 0.7
 wall_share = 0.5
@@ -165,7 +162,8 @@ def test_a_case_knows_all_words_of_the_laws() -> None:
 
 
 def test_laws_of_the_case_reach_the_solver() -> None:
-    case = Case.from_text(BED, "bed.toml", {"liquid.contact_angle": 60.0, "liquid.pull": "lambert"})
+    words = {"liquid.pull": "lambert", "liquid.film": "deforming"}
+    case = Case.from_text(BED, "bed.toml", {"liquid.contact_angle": 60.0, **words})
     laws = bridge_laws_of(case)
     assert laws is not None
     assert (laws.pull, laws.film, laws.viscosity, laws.surface_tension) == ("lambert", "deforming", 5e-3, 0.02)

@@ -19,9 +19,13 @@ SHARE = 20
 OWN_LAWS = ("coating", "wet-bed", "lubrication-study", "drying-bed", "spray-coating-hot")
 """Cases whose laws no other test compiles."""
 LIKE_ANOTHER = (
-    "defluidisation", "gas-bed-flat", "hopper-with-air", "packed-bed", "sedimentation", "spouted-bed", "wurster",
+    "defluidisation", "gas-bed", "gas-bed-flat", "hopper-with-air", "packed-bed", "sedimentation", "settling",
+    "spouted-bed", "wurster",
 )  # fmt: skip
-"""Cases of a kind that another one has, too: gas beds, beds in liquid, vessels. `.ci/wheel` starts every case."""
+"""Cases of a kind that another one has, too: gas beds, beds in liquid, vessels; or another test: one sphere.
+
+`.ci/wheel` starts every case.
+"""
 
 
 def try_out(name: str, folder: Path, overrides: dict[str, Any]) -> None:

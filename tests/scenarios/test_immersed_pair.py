@@ -79,6 +79,7 @@ def test_oblique_rebound_with_a_frozen_line_of_centres(row: dict[str, float]) ->
     assert result.rebound_angle_relative == pytest.approx(row["angle_relative"], abs=0.3)
 
 
+@pytest.mark.slow  # a law set of its own; as plain tests: a frozen line of centres, and momentum with this friction
 @pytest.mark.parametrize("row", table("oblique_full"), ids=lambda row: f"{row['angle']:.0f} deg")
 def test_oblique_rebound_on_the_full_path_with_friction_at_overlap(row: dict[str, float]) -> None:
     result = collide(

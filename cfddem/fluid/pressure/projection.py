@@ -58,9 +58,7 @@ class Projection:
             velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, boundaries.halo.ends, self._areas,
             self._inverse,
         )  # fmt: skip
-        assemble(flow, fresh, (*equation.coefficients, missing))
-        if boundaries.cut.cells.size:
-            assemble_cut(flow, boundaries.cut.shares, fresh, boundaries.cut.cells, (*equation.coefficients, missing))
+        assemble(flow, boundaries.cut.shares, fresh, (*equation.coefficients, missing))
         if fresh:
             equation.prepare()
         refuse_nan(grid, missing, time, self.communicator)
@@ -113,27 +111,18 @@ def open_cell(shares, k, j, i):
 
 
 @threaded
-def assemble(flow, fresh, equation):
-    """Right-hand side of the pressure equation and, if fresh, its coefficients, of whole cells.
+def assemble(flow, shares, fresh, equation):
+    """Right-hand side of the pressure equation and, if fresh, its coefficients.
 
     flow      `Flow`
+    shares    of faces and cells that smooth walls leave open; none without walls
     equation  ax, ay, az, anchor and b, all (nz, ny, nx)
     """
     nz, ny, nx = flow.open_cells.shape
     for k in prange(nz):
         for j in range(ny):
             for i in range(nx):
-                balance_cell(flow, (), fresh, equation, k, j, i)
-
-
-@threaded
-def assemble_cut(flow, shares, fresh, cells, equation):
-    """As `assemble`, of cut cells: their numbers, with the shares of faces and cells."""
-    ny, nx = flow.open_cells.shape[1:]
-    for n in prange(cells.size):
-        k, row = divmod(cells[n], ny * nx)
-        j, i = divmod(row, nx)
-        balance_cell(flow, shares, fresh, equation, k, j, i)
+                balance_cell(flow, shares, fresh, equation, k, j, i)
 
 
 @inline

@@ -64,8 +64,8 @@ def _of_bed(setting: Setting, beds: list[Outcome]) -> list[Row]:
 
 
 def _named(setting: Setting) -> str:
-    moved = "" if setting.agitation == "none" else ", with agitation"
-    return f"{setting.spheres}, {1e3 * setting.viscosity:g} mPa s{moved}"
+    rest = ", without agitation" if setting.agitation == "none" else ""
+    return f"{setting.spheres}, {1e3 * setting.viscosity:g} mPa s{rest}"
 
 
 # ---------------------------------------------------------------- figures

@@ -51,7 +51,7 @@ class Fall(Settings):
     by_place: ClassVar[int] = 4
 
     diameter: float = Field(5.5e-3, gt=0, description="of the bead [m]")
-    liquid: str | Liquid = Field("water", description='"water" or "m5", or a Liquid')
+    liquid: str | Liquid = Field("water", description='"water" or "m5"; in Python also a Liquid')
     film: float = Field(0.4e-3, gt=0, description="depth of the film at rest [m]")
     velocity: float = Field(0.5, gt=0, description="of the bead towards the plate where it meets the film [m/s]")
     method: Literal["grid", "isph"] = Field(

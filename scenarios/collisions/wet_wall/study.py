@@ -75,9 +75,12 @@ class WetImpact(Settings):
 
     by_place: ClassVar[int] = 4
 
-    particle: str | Ball = Field("glass_1.74", description='"glass_0.91", "glass_1.74" or "alumina_1.74", or a Ball')
+    particle: str | Ball = Field(
+        "glass_1.74", description='"glass_0.91", "glass_1.74" or "alumina_1.74"; in Python also a Ball'
+    )
     liquid: str | Liquid | None = Field(
-        "water", description='"water", "tween", "glycerol_35" or "glycerol_51", or a Liquid; None for a dry wall'
+        "water",
+        description='"water", "tween", "glycerol_35" or "glycerol_51"; in Python also a Liquid, or None for a dry wall',
     )
     film: float = Field(100e-6, ge=0, description="thickness of the layer; 0 for a dry wall [m]")
     velocity: float = Field(

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.expansion import expansion_exponents
 from closures.agitation import free_spheres
@@ -93,6 +93,7 @@ def is_corner(point: Point) -> bool:
     return all(getattr(point, name) in levels for name, levels in CORNERS.items())
 
 
+@cache
 def is_in_range(point: Point) -> bool:
     """Whether agitation was measured at the Reynolds number of a point."""
     lowest, highest = law_of(free_spheres).ranges["reynolds"]
@@ -119,6 +120,12 @@ def plan() -> Iterator[Run]:
             yield Run(point, film, seed)
 
 
+@cache
+def reference_bed() -> Case:
+    """The lubrication study, from which all beds of the map are made."""
+    return Case.from_toml(gallery_files()["lubrication-study"])
+
+
 def bed(point: Point, film: str, seed: int) -> Case:
     """The case of a bed: that of the lubrication study with other liquid, spheres, velocity and duration.
 
@@ -130,7 +137,7 @@ def bed(point: Point, film: str, seed: int) -> Case:
     height = (
         case.particle_count * math.pi / 6.0 * case.bed.diameter**3 / (case.column.floor_area * point.solid_fraction)
     )
-    end, reference = TURNOVERS * height / velocity, gallery()["lubrication-study"]
+    end, reference = TURNOVERS * height / velocity, reference_bed()
     faster = (velocity / REFERENCE_VELOCITY) ** 2
     solid, liquid = reference.solid.density, reference.required_fluid.density
     heavier = (point.density_ratio - 1.0) * liquid / (solid - liquid)
@@ -192,7 +199,7 @@ def reynolds(case: Case) -> float:
 
 
 def _of_liquid(density_ratio: float, viscosity: float) -> Case:
-    case = gallery()["lubrication-study"]
+    case = reference_bed()
     density = density_ratio * case.required_fluid.density
     changes = {"bed.count": SPHERES, "material.sphere.density": density, "fluid.viscosity": viscosity}
     return case.with_(**changes)

@@ -7,6 +7,7 @@ centimetres.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -149,14 +150,21 @@ def followed(case: Case, times: Iterable[float]) -> tuple[dict[float, list[float
     return by_time, row(simulation)
 
 
-def exact_cases(curves: Curves) -> list[Row]:
-    """One sphere in a stream, and two spheres, beside exact solutions."""
-    by_time, now = followed(cooling(), COOLED)
+def exact_cases(curves: Curves, latest: float = math.inf) -> list[Row]:
+    """One sphere in a stream, and two spheres, beside exact solutions.
+
+    latest  end of the comparison [s]
+    """
+
+    def until_latest(by_time: dict[float, float]) -> dict[float, float]:
+        return {time: value for time, value in by_time.items() if time <= latest}
+
+    by_time, now = followed(cooling(), cooled := until_latest(COOLED))
     lost = [now["heat_imbalance"]]
-    points = [(time, by_time[time][0], value) for time, value in COOLED.items()]
+    points = [(time, by_time[time][0], value) for time, value in cooled.items()]
     rows = [worst("sphere that air cools, exact: temperature", points, SHARE * 75.0, unit="K")]
-    for name, (keys, cold, hot) in EXACT.items():
-        gap, step = SETUP[name]
+    for name, (keys, *exact) in EXACT.items():
+        (gap, step), (cold, hot) = SETUP[name], map(until_latest, exact)
         case = two_spheres(gap, step, 500.0, keys, **(FLAT if name == "radiation" else {}))
         by_time, now = followed(case, {*cold, *hot})
         lost.append(now["contact_heat_imbalance"])
