@@ -15,7 +15,6 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.environment import lookup_environment
-from numba.core.targetconfig import TargetConfig
 
 
 class _WithoutAddresses:
@@ -30,7 +29,10 @@ class _Code(JITCodeLibrary):  # type: ignore[misc]
     """Code that is optimised once, where it is whole: not each function before it is linked, too."""
 
     def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout  # type: ignore[attr-defined]
+        if not hasattr(self._codegen, "_data_layout"):
+            super()._optimize_functions(module)  # type: ignore[no-untyped-call]
+            return
+        module.data_layout = self._codegen._data_layout
 
 
 class _LinkedCode(_Code):
@@ -129,7 +131,10 @@ def compare_quickly(settings: type) -> None:
 
 
 PART, CALLED = ways(JITCodeLibrary)
-compare_quickly(TargetConfig)
+if is_supported(JITCodeLibrary):
+    from numba.core.targetconfig import TargetConfig
+
+    compare_quickly(TargetConfig)
 
 INLINE: dict[str, Any] = {**PART, "forceinline": True, "_nrt": False}
 """Small functions that are always inlined, and count no references: they own no arrays."""

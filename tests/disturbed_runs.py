@@ -167,7 +167,7 @@ def kill_and_go_on(folder: Path, kills: int, seed: int, case: str = TINY) -> int
                 time.sleep(0.002)
             time.sleep(instants.uniform(0.0, 0.25))
         process.kill()
-        _, said = process.communicate(timeout=1200)
+        _, said = process.communicate(timeout=900)
         if process.returncode != -signal.SIGKILL:
             assert process.returncode == 0, said
             return hits
@@ -179,7 +179,7 @@ def kill_and_go_on(folder: Path, kills: int, seed: int, case: str = TINY) -> int
             for place in range(len(seen.times)):
                 assert np.isfinite(seen.particles(place)["position"]).all()
     process = _started(folder)
-    _, said = process.communicate(timeout=7200)  # also on a busy machine
+    _, said = process.communicate(timeout=1800)  # also on a busy machine
     assert process.returncode == 0, said
     return hits
 

@@ -217,14 +217,12 @@ class WholeCells:
     """Of a grid without smooth walls: all cells and faces are whole.
 
     shares  apertures and volumes for compiled loops; none here
-    cells   numbers of the cells that walls cut, without ghosts; none here
     """
 
     volume: Any = 1.0
     aperture: Any = 1.0
     beyond: Any = 0.0
     shares: tuple[Array, ...] = ()
-    cells: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def close(self, solved: Array, blocked: NDArray[np.bool_]) -> None:
         """Mark the faces that walls close, as of :class:`cfddem.fluid.boundaries.Faces`."""
@@ -310,12 +308,6 @@ class CutCells(WholeCells):
         for field in fields:
             halo.fill_faces(field)
         self.shares = self.aperture, self.volume
-        touched = (grid.inner(self.volume) < 1.0) & grid.open
-        for d in range(3):
-            for side in range(2):
-                faces = np.roll(self.aperture[d], -side, axis=2 - d)
-                touched |= (grid.inner(faces) < 1.0) & grid.open
-        self.cells = np.flatnonzero(touched)
 
     def points(self, offset: Sequence[float]) -> list[Array]:
         """Coordinates x, y, z at a place in every padded cell, full arrays [m]."""

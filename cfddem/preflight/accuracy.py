@@ -31,7 +31,7 @@ cells")."""
 
 
 class Change(NamedTuple):
-    """By what a result changed in a bed of the validation, with smeared surfaces."""
+    """By what a result changed in a bed of the validation."""
 
     name: str
     value: float
@@ -39,11 +39,12 @@ class Change(NamedTuple):
     table: str  # of `docs/tables`
     row: str  # that it is read from
     bed: str
+    surface: str = "smeared"
 
-    @property
-    def note(self) -> str:
-        """Standard error and bed, in words."""
-        return f"+- {self.error:.2g}, {self.bed}"
+    def note(self, surface: str) -> str:
+        """Standard error and bed, in words, for a case with sharp or smeared surfaces."""
+        other = "" if surface == self.surface else f", with {self.surface} surfaces"
+        return f"+- {self.error:.2g}, {self.bed}{other}"
 
 
 STEPS = "smooth, 1e+05 Pa: {}, fluid step over a tenth of it"
@@ -51,9 +52,9 @@ FINER = "{} gas bed, cells finer by 1.5: {} over the reference run"
 
 LIQUID = (
     Change("tenth of fluid step: collisions", 0.944, 0.028, "bed-steps", STEPS.format("collisions of a sphere"),
-           "film study"),
+           "film study", "sharp"),
     Change("the same: granular temperature", 0.948, 0.012, "bed-steps", STEPS.format("granular temperature"),
-           "film study"),
+           "film study", "sharp"),
     Change("cells finer by 1.5: bed height", 1.008, 0.004, "beds",
            "liquid bed, cells finer by 1.5: height over the reference run", "alginate bed"),
 )  # fmt: skip
@@ -90,12 +91,11 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
         return
     if bed.inlet == 0.0:
         return
-    other = ", with smeared surfaces" if sharp else ""
     for figure in LIQUID if case.in_liquid else GAS:
-        yield figure.name, figure.value, "", figure.note + other
+        yield figure.name, figure.value, "", figure.note(case.surface)
     own = case.laws.kernel_width
     if case.in_liquid and own != 1.5 and BY_KERNEL[0][0] <= own <= BY_KERNEL[-1][0]:
-        note = f"over 1.5 d, glass beads{other}"
+        note = "over 1.5 d, glass beads, with smeared surfaces"
         yield "this kernel: granular temperature", between(BY_KERNEL, own), "", note
 
 

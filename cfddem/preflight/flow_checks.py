@@ -57,14 +57,12 @@ def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
             f"{OF_SPHERE:.2g}: it filters nothing",
             "use 1.5, the default, or 0 for no kernel",
         )  # fmt: skip
-        return
     if across > widest and not case.is_one_sphere:
         yield Issue(
             "warning", "laws.kernel_width",
-            f"{width:.3g} diameters on both sides, {across:.2g} m, is more than the column is wide, {widest:.3g} m",
+            f"{width:.3g} diameters reach {0.5 * across:.3g} m to each side; the column is {widest:.3g} m wide",
             "use 1.5, the default, or a wider column",
         )  # fmt: skip
-        return
     spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
     yield from _check_smallest_cell(case, min(spacing, default=min(case.column.size)))
 
@@ -196,14 +194,14 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     if case.vessel and case.vessel.shape == "surface":
         reason = "the vessel is a surface from a file"
         yield Issue("error", "laws.wall_drag", reason, 'set laws.wall_drag = "none"')
-    column = case.column
-    if case.has_fluid and (case.line or case.vessel or any(case.closes_cells(wall) for wall in case.wall)):
+    elif case.has_fluid and (case.line or case.vessel or any(case.closes_cells(wall) for wall in case.wall)):
         yield Issue(
             "warning", "laws.wall_drag",
             "beside the wall of a vessel, a round column or a wall with solid cells the grid slows the flow, too: a "
             "single sphere there has up to 8 % too much drag",
-            'expect it there, or set laws.wall_drag = "none"',
+            'allow for it in comparisons, or set laws.wall_drag = "none"',
         )  # fmt: skip
+    column = case.column
     pairs = column.ends, column.sides, column.sides if column.front is None else column.front
     faces = 2 * sum(pair != "periodic" for pair in pairs) + len(case.wall)
     if case.laws.wall_drag == "all" and case.has_fluid and faces > 1:

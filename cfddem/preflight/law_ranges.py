@@ -30,7 +30,7 @@ REMEDY = "choose another law; cfddem explain lists all with their ranges"
 ON_BY_DEFAULT = 'on by default; laws.agitation = "none" leaves it out'
 """What a user should know who has chosen no law of agitation."""
 
-AGITATED = "inside, agitation changes bed heights by up to 2 % and granular temperatures by a factor of up to 9"
+AGITATED = "inside, agitation changes bed heights by up to 3 %; without it small beds come to rest"
 """Effect on the beds of the lubrication study with and without agitation."""
 
 NOT_FITTED_WITH = (

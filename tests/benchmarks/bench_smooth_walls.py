@@ -18,7 +18,7 @@ from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
 
-CELLS, SIDE, STEP, LIMIT = (24, 24, 48), 0.0024, 5e-4, 1.25
+CELLS, SIDE, STEP, AIM = (24, 24, 48), 0.0024, 5e-4, 1.25
 """Cells, their edge [m], the step [s], and what a wet cell may take."""
 
 
@@ -46,7 +46,7 @@ def main() -> None:
     ratio, wet = statistics.median(ratios), float(open_share(column).astype(bool).mean())
     of_box, of_column = (statistics.mean(counts) for counts in zip(*iterations))
     print(f"pressure iterations of a step: {of_box:.1f} in the box, {of_column:.1f} in the column")
-    print(f"a step of the column takes {ratio:.2f} of one of the box; a wet cell {ratio / wet:.2f} (limit {LIMIT})")
+    print(f"a step of the column takes {ratio:.2f} of one of the box; a wet cell {ratio / wet:.2f} (aim {AIM})")
 
 
 if __name__ == "__main__":

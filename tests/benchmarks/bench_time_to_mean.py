@@ -23,7 +23,6 @@ from cfddem.case.schema import Case
 from cfddem.run.runner import Run
 
 CASES: dict[str, dict[str, Any]] = {
-    "lubrication-study": {"run.until": 4.0, "run.average_from": None},
     "wet-bed": {"run.average_from": None},
     "liquid-bed": {"run.average_from": None},
 }

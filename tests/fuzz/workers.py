@@ -100,8 +100,13 @@ def work(pipe: Any, home: str, seed: int, limits: Limits) -> None:
     while (number := pipe.recv()) is not None:
         begun = time.process_time()
         most = math.ceil(begun + 3.0 * limits.seconds)  # of a compiled loop, which the limit of the trial does not end
-        resource.setrlimit(resource.RLIMIT_CPU, (most, resource.RLIM_INFINITY))
+        hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
         pipe.send((number, trial(around, seed, number, limits), time.process_time() - begun))
+
+
+START = 600.0
+"""How long a worker may take to import the package on a busy machine [s]."""
 
 
 class Worker:
@@ -119,7 +124,7 @@ class Worker:
         self.process.start()
         other.close()
         self.number: int | None = None
-        self.since = math.inf  # until it is ready
+        self.since = time.monotonic() + START  # later once it is ready
 
     def answer(self) -> tuple[int, str, float] | None:
         """What it says: number, answer and time of a trial, or None once it is ready; EOFError if it has died."""
@@ -130,7 +135,7 @@ class Worker:
 
     @property
     def silent(self) -> float:
-        """How long it has been silent [s]; 0 before it is ready, and while it computes or waits for a processor."""
+        """How long it has been silent [s]; 0 while it starts, and while it computes or waits for a processor."""
         if not self.process.is_alive():
             return 0.0  # the end of its pipe says so
         state = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()[0]
@@ -138,7 +143,7 @@ class Worker:
 
     def send(self, number: int | None) -> None:
         """Give the worker a trial."""
-        self.number, self.since = number, self.since if math.isinf(self.since) else time.monotonic()
+        self.number, self.since = number, max(self.since, time.monotonic())
         self.pipe.send(number)
 
     def replace(self) -> str:

@@ -11,7 +11,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Plane
+from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Wall
 
 GLASS = Material(
     density=2500,
@@ -23,10 +23,21 @@ GLASS = Material(
     friction_lubricated=0.1,
 )
 RADIUS = 0.5e-3
+SIDE = 12 * 2.2 * RADIUS
+BELOW = Plane(point=(0.0, 0.0, -1e-3))
+DRUM = Cylinder(point=(0.5 * SIDE, 0.5 * SIDE, 0.0), radius=1e-2, spin=(0.0, 0.0, 20.0))
+CORNERS = ((0.0, 0.0, -0.9), (13.2, 0.0, -0.9), (13.2, 13.2, -0.9), (0.0, 13.2, -0.9), (6.6, 6.6, -0.1))
+ROOF = Mesh(
+    vertices=np.array(CORNERS) * 1e-3,
+    triangles=np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]),
+    spin=(0.0, 0.0, 20.0),
+)  # fmt: skip
 
 
-def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> ParticleSolver:
-    """1 440 spheres of several sizes that fall on a floor in a periodic box, with and without water."""
+def rain(
+    film: bool, skin: float | None = None, sort_every: int = 5, walls: tuple[Wall, ...] = (Plane(),)
+) -> ParticleSolver:
+    """1 440 spheres of several sizes that fall on a floor in a periodic box or a drum, with and without water."""
     generator = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in (12, 12, 10)), indexing="ij"), axis=-1).reshape(-1, 3)
     position = (cells + 0.5 + 0.1 * generator.uniform(-1, 1, cells.shape)) * 2.2 * RADIUS
@@ -42,10 +53,10 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Particle
     return ParticleSolver(
         grains,
         pair_table([GLASS]),
-        walls=[Plane()],
+        walls=walls,
         laws=Laws(film=film),
         gravity=(0.0, 0.0, -9.81),
-        box=(12 * 2.2 * RADIUS, 12 * 2.2 * RADIUS, None),
+        box=(None if DRUM in walls else SIDE, None if DRUM in walls else SIDE, None),
         skin=skin,
         sort_every=sort_every,
     )
@@ -58,10 +69,21 @@ def by_id(run: ParticleSolver) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("film", "steps"),
-    [(False, 10_000), *(pytest.param(True, steps, marks=pytest.mark.slow) for steps in (2000, 10_000))],
+    ("film", "steps", "walls"),
+    [
+        (False, 8000, (BELOW, DRUM)),
+        *(
+            pytest.param(film, steps, walls, marks=pytest.mark.slow)
+            for film, steps, walls in (
+                (False, 10_000, (Plane(),)),
+                (True, 2000, (Plane(),)),
+                (True, 10_000, (BELOW, DRUM)),
+                (True, 5000, (BELOW, DRUM, ROOF)),
+            )
+        ),
+    ],
 )
-def test_bits_do_not_depend_on_the_number_of_threads(film: bool, steps: int) -> None:
+def test_bits_do_not_depend_on_the_number_of_threads(film: bool, steps: int, walls: tuple[Wall, ...]) -> None:
     """Positions, velocities, spins and forces on one and on two threads are equal bit for bit."""
     states = []
     for threads in (1, 2):
@@ -70,13 +92,13 @@ def test_bits_do_not_depend_on_the_number_of_threads(film: bool, steps: int) -> 
             use_threads(threads)
         except ValueError:
             pytest.skip("this machine has one thread")
-        run = rain(film)
+        run = rain(film, walls=walls)
         run.advance(2e-6, steps)
         states.append(by_id(run))
         use_threads(before)
     for name, values in states[0].items():
         assert np.array_equal(values, states[1][name]), name
-    assert run.edges.between_particles > 500
+    assert run.edges.between_particles > 300 and len(run.edges.first) - run.edges.between_particles > 40
     assert run.lists.made > 5
 
 

@@ -97,12 +97,12 @@ def test_the_check_says_what_cells_and_kernel_cost() -> None:
 
 def test_what_was_measured_with_smeared_surfaces_says_so_beside_sharp_ones() -> None:
     """On the whole line: nothing of it is cut off."""
-    name = "tenth of fluid step: collisions"
-    assert shown(glass(0.037))[name][1] == "+- 0.028, film study, with smeared surfaces"
-    assert shown(glass(0.037).with_(**{"laws.surface": "smeared"}))[name][1] == "+- 0.028, film study"
+    name, bed = "cells finer by 1.5: bed height", "+- 0.004, alginate bed"
+    assert shown(glass(0.037))[name][1] == f"{bed}, with smeared surfaces"
+    assert shown(glass(0.037).with_(**{"laws.surface": "smeared"}))[name][1] == bed
     case = glass(0.037).with_(**{"laws.kernel_width": 2.0})
     noted = [each for each in preflight(case).rows if each.note.endswith("smeared surfaces")]
-    assert len(noted) == len(LIQUID) + 1
+    assert len(noted) == sum(figure.surface == "smeared" for figure in LIQUID) + 1
     assert all(" ".join(each.lines()).endswith("with smeared surfaces") for each in noted)
 
 

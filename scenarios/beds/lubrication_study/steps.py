@@ -1,10 +1,9 @@
 """Whether the bed of the lubrication study depends on its time steps.
 
-Its liquid is more viscous, its surfaces are smeared, and nothing agitates it: it moves by its waves alone, which depend
-on the fluid step. The same beds are run from the same seeds with a tenth of the fluid step, a third of the particle step, and a tenth of
-both. A fluid step has at most 50 particle steps: the particle step is cut to a third at a third of the fluid step, with
-which the run of the whole particle step is made, too, so that one step is changed at a time. Runs are kept as folders:
-interrupted runs are continued, and finished runs are not repeated.
+The same beds are run from the same seeds with a tenth of the fluid step, a third of the particle step, and
+a tenth of both. A fluid step has at most 50 particle steps: the particle step is cut to a third at a third of the fluid
+step, with which the run of the whole particle step is made, too, so that one step is changed at a time. Runs are kept
+as folders: interrupted runs are continued, and finished runs are not repeated.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ from scenarios.beds.lubrication_study.study import SEEDS, Outcome, Setting, bed,
 from scenarios.validation.kept_runs import finished, taken
 from scenarios.validation.table import Progress, Row
 
-SMOOTH = Setting("smooth", 4.0e-3, 1.0e5, "none")
-STIFFER = Setting("smooth", 4.0e-3, 4.0e5, "none")
-BARE = Setting("no film", 4.0e-3, 1.0e5, "none")
+SMOOTH = Setting("smooth", 3.5e-3, 1.0e5)
+STIFFER = Setting("smooth", 3.5e-3, 4.0e5)
+BARE = Setting("no film", 3.5e-3, 1.0e5)
 
 
 class Steps(NamedTuple):
@@ -87,11 +86,7 @@ def run(home: Path, setting: Setting, steps: Steps, seed: int, progress: Progres
     """Run one bed unless it is finished or another process runs it."""
     case, name = bed(setting, seed), name_of(setting, steps, seed)
     usual = estimate_steps(case, estimate_bed(case))
-    changes = {
-        "laws.surface": "smeared",
-        "run.particle_step": usual.particle / steps.particle,
-        "run.fluid_step": usual.fluid / steps.fluid,
-    }
+    changes = {"run.particle_step": usual.particle / steps.particle, "run.fluid_step": usual.fluid / steps.fluid}
     with taken(home, name) as mine:
         if mine:
             finished(case, home, name, progress, changes)

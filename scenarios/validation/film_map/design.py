@@ -51,7 +51,7 @@ REFERENCE_SPEED = 0.64
 """Speed of the fastest collisions over the superficial velocity."""
 
 REFERENCE_VELOCITY = 0.0785
-"""Superficial velocity at which contacts are as soft as those of the lubrication study [m/s]."""
+"""Superficial velocity for which the softened contact of the gallery case, 0.1 MPa, was chosen [m/s]."""
 
 
 class Point(NamedTuple):
@@ -129,7 +129,7 @@ def reference_bed() -> Case:
 def bed(point: Point, film: str, seed: int) -> Case:
     """The case of a bed: that of the lubrication study with other liquid, spheres, velocity and duration.
 
-    The contacts are softened so that spheres overlap as little as there, by their weight and by their collisions.
+    The contacts are softened so that spheres overlap as little in all beds, by their weight and by their collisions.
     """
     case = _of_liquid(point.density_ratio, viscosity(point.stokes, point.density_ratio))
     exponent, terminal = expansion_exponents(case)["Richardson-Zaki"]
