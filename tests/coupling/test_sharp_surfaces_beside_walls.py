@@ -86,9 +86,9 @@ ROUND = {"shape": "cylinder", "radius": RADIUS}
 @pytest.mark.parametrize(
     ("layer", "vessel", "cell", "wide"),
     [
-        (rings(RADIUS), ROUND, 5e-3 / 3.0, 7),
+        (rings(RADIUS, 0.3), ROUND, 2.5e-3, 5),
+        pytest.param(rings(RADIUS), ROUND, 5e-3 / 3.0, 7, marks=pytest.mark.slow),
         pytest.param(rings(RADIUS), ROUND, 5e-3 / 3.0, 8, marks=pytest.mark.slow),
-        pytest.param(rings(RADIUS, 0.3), ROUND, 2.5e-3, 5, marks=pytest.mark.slow),
         pytest.param(square(20.0), {"shape": "box", "size": [0.01, 0.01], "turn": 20.0}, 5e-3 / 3.0, 9,
                      marks=pytest.mark.slow),
         pytest.param(square(45.0), {"shape": "box", "size": [0.01, 0.01], "turn": 45.0}, 5e-3 / 3.0, 10,
