@@ -177,7 +177,7 @@ def test_check_draws_a_surface_vessel(tmp_path: Path) -> None:
         (np.add(cone(), [0.0, 0.0, 0.004]), {}, r'column.ends.*does not reach from the floor.*from 0.004 to 0.084 m'),
         (None, {"vessel.file": "none.stl"}, r"vessel.file.*none.stl'.*a readable surface file"),
         (None, {"vessel.file": "part.step"}, r"vessel.file.*part.step'.*must be a surface file, \*.stl, \*.ply or"),
-        (None, {"vessel.spin": 3.0}, r'vessel.spin = 3.*left out for shape = "surface".*"cylinder" or "cone" or "chain"'),
+        (None, {"vessel.spin": 3.0}, r'vessel.spin = 3.*left out for shape = .*"cylinder" or "cone" or "chain"'),
         (None, {"vessel.radius": 0.01}, r'vessel.radius = 0.01.*left out for shape = "surface"'),
         (None, {"vessel": {"shape": "box", "size": [0.05, 0.01]}}, r"vessel.size = .*within the column, 0.04 m by"),
         (None, {"vessel": {"shape": "box"}}, r'vessel.size: must be given for shape = "box"'),
