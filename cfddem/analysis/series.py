@@ -139,15 +139,20 @@ def drift_of(time: Array, values: Array) -> tuple[float, float]:
     if len(values) < FEWEST:
         return float("nan"), float("nan")
     since = (time - time.mean()) / (time[-1] - time[0])
-    drift = float(since @ (values - values.mean()) / (since @ since))
+    drift = _slope(since, values)
     return drift, float(np.sqrt(12.0)) * block_average(values - drift * since).error
 
 
 def _less_its_line(values: Array) -> Array:
     """A series less the straight line through it, by least squares."""
-    since = np.arange(len(values)) - 0.5 * (len(values) - 1)
-    fluctuation: Array = values - values.mean()
-    return fluctuation - (since @ fluctuation / max(float(since @ since), 1.0)) * since
+    since: Array = np.arange(len(values), dtype=float) - 0.5 * (len(values) - 1)
+    rest: Array = values - values.mean() - _slope(since, values) * since
+    return rest
+
+
+def _slope(since: Array, values: Array) -> float:
+    """Slope of the straight line through a series, by least squares, over a time whose mean is 0."""
+    return float(since @ (values - values.mean()) / ((since @ since) or 1.0))
 
 
 class Spectrum(NamedTuple):

@@ -134,8 +134,8 @@ def test_every_particle_that_enters_is_there_or_was_last_seen_before_the_weir(ov
     assert set(particles.id.tolist()) == (set(range(400)) | came) - left
     assert len(came) == found["fed_count"] and len(left) == found["removed_count"] > 500
     assert abs(len(came) - RATE * END) <= 1.0 + found["waiting_count"]
-    place, ahead = np.array(overflow.last_seen)[:, :3], np.array(overflow.last_seen)
-    ahead = place + 2e-3 * ahead[:, 3:]  # a step later
+    place, velocity = np.hsplit(np.array(overflow.last_seen), 2)
+    ahead = place + 2e-3 * velocity  # a step later
     away = np.hypot(ahead[:, 0] - 0.01, ahead[:, 1] - 0.01)
     print(f"{len(left)} left, from z = {place[:, 2].min():.4f} m, off the axis by {away.min():.4f} m at least")
     assert (place[:, 2] > SILL).all() and (np.abs(place[:, 1] - 0.01) < 0.006).all() and (place[:, 0] > 0.01).all()

@@ -20,7 +20,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.io.reading import open_run
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.step_estimate import estimate_steps
-from scenarios.beds.lubrication_study.study import SEEDS, Outcome, Setting, bed, outcome
+from scenarios.beds.lubrication_study.study import SEEDS, Outcome, Setting, bed, change, mean, outcome
 from scenarios.validation.kept_runs import finished, taken
 from scenarios.validation.table import Progress, Row
 
@@ -114,13 +114,14 @@ def table(home: Path) -> list[Row]:
 
 def _row(comparison: Comparison, measure: str, limit: float, pairs: list[tuple[Outcome, Outcome]]) -> Row:
     """Ratio of the means; the limit is no less than some standard errors of the difference seed by seed."""
-    longer, shorter = (np.array([getattr(outcome, measure) for outcome in side]) for side in zip(*pairs))
-    error = np.nan if len(pairs) < 2 else np.std(longer - shorter, ddof=1) / np.sqrt(len(pairs)) / shorter.mean()
+    longer, shorter = zip(*pairs)
+    changed = change(longer, shorter, measure)
+    values = (mean(side, measure).value for side in (longer, shorter))
     return Row(
         f"{comparison.setting.spheres}, {comparison.setting.modulus:.0e} Pa: {NAMES[measure]}, {comparison.words}",
-        float(longer.mean() / shorter.mean()), 1.0, float(np.fmax(limit, comparison.errors * error)),
-        note=f"{longer.mean():.4g} and {shorter.mean():.4g} in SI units; standard error of the paired difference "
-        f"{error:.2g} over {len(pairs)} seeds",
+        1.0 + float(changed.value), 1.0, float(np.fmax(limit, comparison.errors * changed.error)),
+        note="{:.4g} and {:.4g} in SI units; standard error of the paired difference ".format(*values)
+        + f"{changed.error:.2g} over {changed.seeds} seeds",
     )  # fmt: skip
 
 

@@ -169,8 +169,21 @@ def meetings(rows: Mapping[str, Array], reach: float) -> float:
     return float(rows["weight"][between].sum() - rows["weight"][between][order][1:][again].sum())
 
 
-def mean(beds: list[Outcome], measure: str) -> Mean:
+def mean(beds: Sequence[Outcome], measure: str) -> Mean:
     """Mean of a quantity over the seeds; the standard error needs at least two."""
-    values = np.array([getattr(bed, measure) for bed in beds])
-    error = values.std(axis=0, ddof=1) / np.sqrt(len(beds)) if len(beds) > 1 else np.full_like(values[0], np.nan)
-    return Mean(values.mean(axis=0), error, len(beds))
+    return _mean(np.array([getattr(bed, measure) for bed in beds]))
+
+
+def change(beds: Sequence[Outcome], others: Sequence[Outcome], measure: str) -> Mean:
+    """Change of a quantity from other beds to beds of the same seeds, seed by seed, over the mean of the others [-].
+
+    As far as both have run: each bed runs from one seed after the other.
+    """
+    pairs = [(getattr(bed, measure), getattr(other, measure)) for bed, other in zip(beds, others)]
+    of_beds, of_others = (np.array(side) for side in zip(*pairs))
+    return _mean((of_beds - of_others) / of_others.mean())
+
+
+def _mean(values: Array) -> Mean:
+    error = values.std(axis=0, ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.full_like(values[0], np.nan)
+    return Mean(values.mean(axis=0), error, len(values))

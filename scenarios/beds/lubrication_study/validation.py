@@ -16,8 +16,10 @@ from scenarios.beds.lubrication_study.study import (
     SETTINGS,
     SPHERES,
     VISCOSITIES,
+    Mean,
     Outcome,
     Setting,
+    change,
     folder_of,
     mean,
     outcomes,
@@ -41,26 +43,46 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 
 def rows(of_settings: dict[Setting, list[Outcome]]) -> list[Row]:
-    """Results of every bed with errors, then the change with the contact stiffness."""
+    """Results of every bed with errors, then the changes by films and by the contact stiffness."""
     table = []
     for setting in SETTINGS:
         if setting.modulus == MODULI[0] and setting in of_settings:
             table += _of_bed(setting, of_settings[setting])
     for setting in SETTINGS:
+        bare = setting._replace(spheres="no film")
+        if setting != bare and setting in of_settings and bare in of_settings:
+            table += _changes(f"{_named(setting)}, {setting.modulus:.0e} Pa", "by the film",
+                              of_settings[setting], of_settings[bare])  # fmt: skip
+    for setting in SETTINGS:
         softer = setting._replace(modulus=MODULI[0])
         if setting.modulus != MODULI[0] and setting in of_settings and softer in of_settings:
             ratio = mean(of_settings[setting], "bed_height").value / mean(of_settings[softer], "bed_height").value
             table.append(Row(f"{_named(setting)}: bed height, stiffer over softer contacts", ratio, 1.0, STIFFER))
+            table += _changes(_named(setting), "by stiffer contacts", of_settings[setting], of_settings[softer])
     return table
 
 
 def _of_bed(setting: Setting, beds: list[Outcome]) -> list[Row]:
     table = []
-    for measure, (name, unit, factor) in MEASURES.items():
-        value, error, seeds = mean(beds, measure)
-        note = f"standard error {factor * error:.2g} over {seeds} seeds" if seeds > 1 else "one seed"
-        table.append(Row(f"{_named(setting)}: {name}", factor * value, unit=unit, note=note))
+    for measure, (name, unit, factor) in (MEASURES | COUNTS).items():
+        average = mean(beds, measure)
+        if np.isfinite(average.value):  # there is no Stokes number without a film
+            note = _note(average, factor)
+            table.append(Row(f"{_named(setting)}: {name}", factor * average.value, unit=unit, note=note))
     return table
+
+
+def _changes(beds: str, cause: str, changed: list[Outcome], others: list[Outcome]) -> list[Row]:
+    """Relative changes of the measures, seed by seed."""
+    changes = {name: change(changed, others, measure) for measure, (name, _, _) in MEASURES.items()}
+    return [Row(f"{beds}: change of {name} {cause}", 100.0 * average.value, unit="%", note=_note(average, 100.0))
+            for name, average in changes.items()]  # fmt: skip
+
+
+def _note(average: Mean, factor: float) -> str:
+    """Standard error in a unit, by the factor from SI to it."""
+    seeds = f"over {average.seeds} seeds"
+    return f"standard error {factor * average.error:.2g} {seeds}" if average.seeds > 1 else "one seed"
 
 
 def _named(setting: Setting) -> str:
@@ -78,6 +100,13 @@ MEASURES = {
     "collisions": ("collisions of a sphere", "1/s", 1.0),
 }
 """Name, unit, and factor from SI to that unit."""
+
+COUNTS = {
+    "contacts": ("contacts over spheres", "-", 1.0),
+    "stokes": ("median Stokes number", "-", 1.0),
+    "solids_meet": ("collisions in which solids meet", "%", 100.0),
+}
+"""Of what the table has besides, likewise."""
 
 MOST = 8.0
 """Density of the darkest shade of the maps [1/decade2]."""
