@@ -75,7 +75,7 @@ __all__ = [
 if "OMP_WAIT_POLICY" not in os.environ:
     # A thread that waits for another by spinning keeps it from its core where other work runs too, and a step takes
     # a hundred times as long. A short spin, then sleep, costs a quiet machine little.
-    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+    os.environ.setdefault("GOMP_SPINCOUNT", "10000")
 
 CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
@@ -122,7 +122,7 @@ class Threaded:
 
     def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
-        self.one = kept_on_disk(njit(**CALLED)(renamed(function, f"{function.__name__}_on_one_thread")))
+        self.one = kept_on_disk(njit(**CALLED, noalias=True)(renamed(function, f"{function.__name__}_on_one_thread")))
         self.all = kept_on_disk(njit(**CALLED, parallel=True)(function))
 
     @property

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import prange, threaded, vector_inline
 from cfddem.backend.errors import InputError
 from cfddem.coupling.terms import LINES, ForceTerms
 from cfddem.data.fields import Field
@@ -22,6 +22,9 @@ EXTERNAL = Field("external", "N", 3, meaning="force from outside, which the user
 APPLIED = Field(
     "applied_by_run", "N", 3, "scratch", lambda table, rows: table.applied[rows], meaning="applied, as the run set it"
 )
+
+PIECE = 1024
+"""Components whose forces are summed one after the other: few enough for the cache."""
 
 
 class ForceList:
@@ -119,16 +122,24 @@ def require_unwritten(particles: Particles) -> None:
 
 def replace_applied(particles: Particles, forces: tuple[Array, ...]) -> None:
     """Replace `applied` by the sum of forces (N, 3) [N], also as part of the sum of all forces."""
-    _replace(particles.applied, forces, particles.force)
-    particles[APPLIED.name][:] = particles.applied
+    _replace(forces, particles[APPLIED.name], particles.applied, particles.force)
 
 
 @threaded
-def _replace(applied, forces, force):
-    for n in prange(len(force)):
-        for d in range(3):
-            new = 0.0
-            for term in forces:
-                new += term[n, d]
-            force[n, d] += new - applied[n, d]
-            applied[n, d] = new
+def _replace(forces, total, applied, force):
+    """The sum is written to `total` and `applied`. An array of a tuple costs much to look up: once for many rows."""
+    for piece in prange((force.size + PIECE - 1) // PIECE):
+        here = slice(piece * PIECE, min((piece + 1) * PIECE, force.size))
+        new, old, of_all = total.reshape(-1)[here], applied.reshape(-1)[here], force.reshape(-1)[here]
+        new[:] = 0.0
+        for term in forces:
+            _add(new, term.reshape(-1)[here])
+        for n in range(len(new)):
+            of_all[n] += new[n] - old[n]
+            old[n] = new[n]
+
+
+@vector_inline
+def _add(total, term):
+    for n in range(len(total)):
+        total[n] += term[n]

@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
@@ -238,6 +239,8 @@ class FilterKernel:
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""
+        if not any(self.periodic):
+            return position.copy()
         size, origin = np.array(self.grid.whole.size), np.array(self.grid.whole.origin)
         inside: Array = position - self.periodic * size * np.floor((position - origin) / size)
         return inside
@@ -272,7 +275,7 @@ class FilterKernel:
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
         order, start = places or (cell_map.order, cell_map.start)
-        loops.deposit(order, start, values, unit, *cell_map.stencil, self._corners, deposits)
+        loops.deposit(order, start, values, unit, *cell_map.stencil, self._corners, use_threads(None), deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]

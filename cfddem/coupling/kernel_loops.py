@@ -150,28 +150,29 @@ def largest_deposits(values, volume, cell_volume, largest):
 
 
 @threaded
-def deposit(order, start, values, unit, first, shares, corners, fields):
+def deposit(order, start, values, unit, first, shares, corners, lanes, fields):
     """Add values (N, m), in whole numbers of 1/unit (m,), to fields (cells, m): even slabs together, then odd ones.
 
     corners  distance of the cells from the first in flat arrays; unsigned, since no index counts from the end
+    lanes    number of threads, which take the slabs in turns: a bed fills the lower ones alone
     """
     slabs = len(start) - 1
     for phase in range(2):
-        for half in prange((slabs - phase + 1) // 2):
-            slab = phase + 2 * half
-            for place in range(start[slab], start[slab + 1]):
-                _deposit_one(order[place], values, unit, first, shares, corners, fields)
+        for lane in prange(lanes):
+            for slab in range(phase + 2 * lane, slabs, 2 * lanes):
+                _deposit_rows(order[start[slab] : start[slab + 1]], values, unit, first, shares, corners, fields)
 
 
 @serial
-def _deposit_one(n, values, unit, first, shares, corners, fields):
-    """Add the values of one particle to its cells."""
-    for s in range(first.shape[1]):
-        cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
-        for m in range(values.shape[1]):
-            part = values[n, m] * unit[m] / first.shape[1]
-            for corner in range(CORNERS):
-                fields[cell + corners[corner], m] += np.int64(np.rint(_weight(corner, a, b, c) * part))
+def _deposit_rows(rows, values, unit, first, shares, corners, fields):
+    """Add the values of some particles to their cells."""
+    for n in rows:
+        for s in range(first.shape[1]):
+            cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
+            for m in range(values.shape[1]):
+                part = values[n, m] * unit[m] / first.shape[1]
+                for corner in range(CORNERS):
+                    fields[cell + corners[corner], m] += np.int64(np.rint(_weight(corner, a, b, c) * part))
 
 
 @threaded

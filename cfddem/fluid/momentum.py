@@ -231,45 +231,62 @@ def predict(balance, medium, step, weight_b, new, mobility):
     new, mobility  (3, ...) [m/s] and [m2 s/kg]
     """
     old, rate_a, rate_b, pressure, stored, centred, voidage, drag, drag_momentum, source, driving, solved = balance
-    density, inverse, _, model_b = medium
     shape, steps = voidage.shape, strides(voidage.shape)
     voidage, centred, stored = voidage.reshape(-1), centred.reshape(-1), stored.reshape(-1)
     pressure, drag = pressure.reshape(-1), drag.reshape(-1)
     drag_momentum, source = drag_momentum.reshape(3, -1), source.reshape(3, -1)
     rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
     old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
+    times, cells = (step, weight_b), (voidage, centred, stored, drag, pressure)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
         for d in range(3):
-            below = at - steps[d]
-            e_right, e_left = line(voidage, at, n), line(voidage, below, n)
-            c_right, c_left = line(centred, at, n), line(centred, below, n)
-            s_right, s_left = line(stored, at, n), line(stored, below, n)
-            b_right, b_left = line(drag, at, n), line(drag, below, n)
-            v_right, v_left = line(drag_momentum[d], at, n), line(drag_momentum[d], below, n)
-            x_right, x_left = line(source[d], at, n), line(source[d], below, n)
-            p_right, p_left = line(pressure, at, n), line(pressure, below, n)
-            first, second, free = line(rate_a[d], at, n), line(rate_b[d], at, n), line(solved[d], at, n)
-            u, out, mobility_here = line(old[d], at, n), line(new[d], at, n), line(mobility[d], at, n)
-            for i in range(n):
-                face = 0.5 * (c_right[i] + c_left[i])
-                right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
-                beta = 0.5 * (right * b_right[i] + left * b_left[i])
-                beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
-                theta = implicitness(beta * step / (density * face))
-                gradient = (p_right[i] - p_left[i]) * inverse[d]
-                share = face + model_b * (1.0 - face)
-                momentum = (
-                    density * 0.5 * (s_right[i] + s_left[i]) * u[i]
-                    + step * ((1.0 - weight_b) * first[i] + weight_b * second[i])  # convection, viscous stress
-                    - step * share * gradient  # pressure, gravity within
-                    + step * share * driving[d]
-                    + step * 0.5 * (x_right[i] + x_left[i])
-                    + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
-                )
-                inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
-                out[i] = momentum / inertia if free[i] > 0.0 else u[i]
-                mobility_here[i] = free[i] * step * share / inertia
+            place = at, at - steps[d], d
+            out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
+            faces, forces = (old[d], rate_a[d], rate_b[d], solved[d]), (drag_momentum[d], source[d], driving[d])
+            _predict_line(out, mobility_here, cells, faces, forces, place, medium, times)
+
+
+@vector_inline
+def _predict_line(out, mobility, cells, faces, forces, place, medium, times):
+    """`predict` of a line of faces.
+
+    out, mobility  of the line
+    cells          voidage, centred and stored voidage, drag, pressure
+    faces, forces  along the direction: old velocity, both rates, solved; drag momentum, source, driving
+    place          of the line in flat fields, that of the cells before it, and the direction
+    times          the step, and the weight of the second rate
+    """
+    (voidage, centred, stored, drag, pressure), (old, rate_a, rate_b, solved) = cells, faces
+    (drag_momentum, source, driving), (at, below, d), (step, weight_b) = forces, place, times
+    density, inverse, model_b, n = medium.density, medium.inverse[d], medium.model_b, out.size
+    e_right, e_left = line(voidage, at, n), line(voidage, below, n)
+    c_right, c_left = line(centred, at, n), line(centred, below, n)
+    s_right, s_left = line(stored, at, n), line(stored, below, n)
+    b_right, b_left = line(drag, at, n), line(drag, below, n)
+    v_right, v_left = line(drag_momentum, at, n), line(drag_momentum, below, n)
+    x_right, x_left = line(source, at, n), line(source, below, n)
+    p_right, p_left = line(pressure, at, n), line(pressure, below, n)
+    u, first, second, free = line(old, at, n), line(rate_a, at, n), line(rate_b, at, n), line(solved, at, n)
+    for i in range(n):
+        face = 0.5 * (c_right[i] + c_left[i])
+        right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
+        beta = 0.5 * (right * b_right[i] + left * b_left[i])
+        beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
+        theta = implicitness(beta * step / (density * face))
+        gradient = (p_right[i] - p_left[i]) * inverse
+        share = face + model_b * (1.0 - face)
+        momentum = (
+            density * 0.5 * (s_right[i] + s_left[i]) * u[i]
+            + step * ((1.0 - weight_b) * first[i] + weight_b * second[i])  # convection, viscous stress
+            - step * share * gradient  # pressure, gravity within
+            + step * share * driving
+            + step * 0.5 * (x_right[i] + x_left[i])
+            + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
+        )
+        inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
+        out[i] = momentum / inertia if free[i] > 0.0 else u[i]
+        mobility[i] = free[i] * step * share / inertia
 
 
 @inline
