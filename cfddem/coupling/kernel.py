@@ -274,8 +274,8 @@ class FilterKernel:
         values, homes, shape = np.ascontiguousarray(values), self._homes, self.reach.shape
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
-        order, start = places or (cell_map.order, cell_map.start)
-        loops.deposit(order, start, values, unit, *cell_map.stencil, self._corners, use_threads(None), deposits)
+        slabs = places or (cell_map.order, cell_map.start)
+        loops.deposit(slabs, values, unit, *cell_map.stencil, self._corners, use_threads(None), deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]

@@ -150,16 +150,17 @@ def largest_deposits(values, volume, cell_volume, largest):
 
 
 @threaded
-def deposit(order, start, values, unit, first, shares, corners, lanes, fields):
+def deposit(slabs, values, unit, first, shares, corners, lanes, fields):
     """Add values (N, m), in whole numbers of 1/unit (m,), to fields (cells, m): even slabs together, then odd ones.
 
+    slabs    rows of particles in the order of slabs, and the first place of each slab
     corners  distance of the cells from the first in flat arrays; unsigned, since no index counts from the end
     lanes    number of threads, which take the slabs in turns: a bed fills the lower ones alone
     """
-    slabs = len(start) - 1
+    order, start = slabs
     for phase in range(2):
         for lane in prange(lanes):
-            for slab in range(phase + 2 * lane, slabs, 2 * lanes):
+            for slab in range(phase + 2 * lane, len(start) - 1, 2 * lanes):
                 _deposit_rows(order[start[slab] : start[slab + 1]], values, unit, first, shares, corners, fields)
 
 
