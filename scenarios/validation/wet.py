@@ -18,9 +18,8 @@ from scenarios.collisions.three_spheres.validation import first_above, of
 from scenarios.collisions.wet_pair import study as wet_pair
 from scenarios.collisions.wet_pair.study import TRANSITION_PRESSURES, collide_wet
 from scenarios.collisions.wet_wall import validation as wet_wall_validation
-from scenarios.validation.table import Columns, Progress, Row, reference, worst, write_histories
+from scenarios.validation.table import Curves, Progress, Row, reference, worst, write_histories
 
-Curves = dict[str, Columns]
 exact_pair = partial(collide_wet, solver="equations")
 HEAD_ON_CRITICAL = {
     ("static", "constant"): 1.193,
@@ -33,12 +32,13 @@ HEAD_ON_CRITICAL = {
 
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
-    rows, curves = [], {}  # type: ignore[var-annotated]
+    rows: list[Row] = []
+    curves: Curves = {}
     for part in PARTS:
         progress((part.__doc__ or "").splitlines()[0])
         rows += part(folder, curves)
     write_histories(folder / "wet.h5", curves)
-    return rows + wet_wall_validation.study(folder, progress)
+    return rows
 
 
 def pairs(_: Path, __: Curves) -> list[Row]:
@@ -190,4 +190,5 @@ PARTS: tuple[Callable[[Path, Curves], list[Row]], ...] = (
     engine_pairs,
     thick_films,
     pair_figures,
+    *wet_wall_validation.PARTS,
 )

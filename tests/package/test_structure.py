@@ -15,7 +15,6 @@ from house import HOME, Count, counts, every_circle, imports, modules, tree
 
 ROOMS = (
     "backend",
-    "data",
     "model",
     "particles",
     "fluid",
