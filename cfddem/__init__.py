@@ -27,7 +27,6 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.coupling.forces.pressure import PressureForce as PressureForce
     from cfddem.coupling.forces.pressure import Weight as Weight
     from cfddem.coupling.kernel import FilterKernel as FilterKernel
-    from cfddem.data.fields import Field as Field
     from cfddem.fluid.conditions import FreeSlip as FreeSlip
     from cfddem.fluid.conditions import Inlet as Inlet
     from cfddem.fluid.conditions import NoSlip as NoSlip
@@ -40,6 +39,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.model.feature import Feature as Feature
     from cfddem.model.feature import FluidForce as FluidForce
     from cfddem.model.feature import OwnForce as OwnForce
+    from cfddem.model.fields import Field as Field
     from cfddem.particles.initial.pouring import pour as pour
     from cfddem.particles.interactions.bridge import coat as coat
     from cfddem.particles.interactions.bridge_law import BridgeLaws as BridgeLaws
@@ -75,7 +75,7 @@ _MODULES = {
     "Equipment": "cfddem.model.feature",
     "Feature": "cfddem.model.feature",
     "FeatureTable": "cfddem.case.feature_table",
-    "Field": "cfddem.data.fields",
+    "Field": "cfddem.model.fields",
     "FilterKernel": "cfddem.coupling.kernel",
     "Fluid": "cfddem.case.materials",
     "FluidForce": "cfddem.model.feature",

@@ -8,7 +8,7 @@ import numpy as np
 from test_ghosts import DRY, GLASS, STEEL, WET, state
 
 from cfddem.backend.communicator import Communicator
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.ghosts import DividedDomain
 from cfddem.particles.initial.packing import random_packing

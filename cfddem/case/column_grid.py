@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -51,7 +50,11 @@ def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int],
         closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))
     if not closing:
         return Grid.of_size(column.size, column.cell)
-    return Grid.of_size(column.size, column.cell, solid=lambda x, y, z: _any(surface(x, y, z) for surface in closing))
+
+    def solid(x: Array, y: Array, z: Array) -> np.ndarray:
+        return np.asarray(reduce(np.logical_or, (surface(x, y, z) for surface in closing)))
+
+    return Grid.of_size(column.size, column.cell, solid=solid)
 
 
 def open_floor(case: CaseTables) -> Region | None:
@@ -77,8 +80,3 @@ def _closed_by(wall: CaseWall) -> Region:
         return solid_part(wall, points.reshape(-1, 3)).reshape(points.shape[:-1])
 
     return inside
-
-
-def _any(parts: Iterator[np.ndarray]) -> np.ndarray:
-    """Whether any of several masks, which broadcast, is true."""
-    return np.asarray(reduce(np.logical_or, parts))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Species
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.initial.packing import Seed, from_table, log_normal, mono, normal
 
 Array = NDArray[np.float64]

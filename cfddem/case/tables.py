@@ -61,6 +61,12 @@ class Column(Checked):
         return self.sides == "periodic", (self.front or self.sides) == "periodic", self.ends == "periodic"
 
     @property
+    def periodic_lengths(self) -> tuple[float | None, float | None, float | None]:
+        """Lengths of the column along periodic axes [m], None along the others."""
+        x, y, z = (length if repeats else None for length, repeats in zip(self.size, self.periodic))
+        return x, y, z
+
+    @property
     def floor_area(self) -> float:
         """Area of the floor [m2]."""
         width, depth, _ = self.size

@@ -18,7 +18,6 @@ from cfddem.case.vessel_surface import start_box_in, surface_in
 from cfddem.case.wall_geometry import (
     Array,
     distance,
-    enclosed_volume,
     encloses,
     inside_surface,
     solid_part,
@@ -26,6 +25,7 @@ from cfddem.case.wall_geometry import (
     triangles,
 )
 from cfddem.case.walls import CaseWall
+from cfddem.fluid.triangles import signed_volume
 
 Side = Literal["inside", "outside", "behind"]
 
@@ -83,7 +83,7 @@ def belongs_inside(case: CaseTables, wall: CaseWall, corners: Array, places: Arr
     """
     if case.closes_cells(wall):
         return wall.solid == "outside"
-    if enclosed_volume(corners) > VESSEL * math.prod(case.column.size):
+    if abs(signed_volume(corners)) > VESSEL * math.prod(case.column.size):
         return True
     inside = inside_surface(corners, places)
     return bool(2 * np.count_nonzero(inside) > len(inside))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.walls import CaseWall
+from cfddem.fluid.triangles import edges_of
 from cfddem.particles.walls.stl import read_surface
 
 Array = NDArray[np.float64]
@@ -67,11 +68,8 @@ def circle(axis: Array, count: int) -> Array:
 
 def is_closed(corners: Array) -> bool:
     """Whether every edge of triangles (T, 3, 3) belongs to two of them."""
-    names = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
-    edges = np.sort(np.concatenate([names[:, [0, 1]], names[:, [1, 2]], names[:, [2, 0]]]), axis=1)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    _, count = np.unique(edges, axis=0, return_counts=True)
-    return bool((count % 2 == 0).all())
+    _, _, count = edges_of(corners)
+    return not (count.sum(axis=1) % 2).any()
 
 
 @lru_cache(maxsize=8)
@@ -216,11 +214,6 @@ def _crossings(corners: Array, lines: Array) -> tuple[NDArray[np.int64], Array]:
             places.append((of_a * ax + of_b * bx + of_c * cx)[inside])
         begin = end
     return np.concatenate(numbers), np.concatenate(places)
-
-
-def enclosed_volume(corners: Array) -> float:
-    """Volume inside a closed surface of triangles (T, 3, 3) [m3]."""
-    return abs(float(np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))) / 6.0
 
 
 def corners_of(low: Array, high: Array) -> Array:

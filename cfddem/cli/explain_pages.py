@@ -93,7 +93,11 @@ def find(name: str) -> Law:
     matching_laws = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not matching_laws:
         authors = sorted({author.lower() for law in every for author in re.findall(r"[^\W\d_]{4,}", law.reference)})
-        closest = _closest(word, [law.name for law in every]) or _closest(name, every_key()) or _closest(name, authors)
+        closest = (
+            _closest(word, [law.name for law in every])
+            or _closest(name, list(dict(_keys())))
+            or _closest(name, authors)
+        )
         raise InputError("law", name, f"a name listed by `cfddem explain`{closest}", absent(name))
     if len(matching_laws) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in matching_laws)}")
@@ -384,11 +388,6 @@ def not_there(name: str) -> list[str]:
     """What the table of a name does not have, in lines of at most 100 columns; empty for other names."""
     words = TABLES.get(name.lower(), "")
     return ["", *textwrap.wrap(f"{words} The page Limits has more.", line_width())] if words else []
-
-
-def every_key() -> list[str]:
-    """Names of all keys, with their tables."""
-    return [key for key, _ in _keys()]
 
 
 def _keys() -> Iterator[tuple[str, FieldInfo]]:

@@ -23,10 +23,10 @@ from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SharpFlowSampler
 from cfddem.coupling.terms import CouplingTerms, ForceTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 
@@ -166,22 +166,16 @@ class Coupling:
         """How often the law of each force was evaluated outside its range, by the name of the force."""
         return self.forces.outside(self.fluid.communicator)
 
-    def checkpoint(self) -> dict[str, Any]:
-        """What the next step depends on beside fluid, particles and forces."""
-        return {"last_step": self.momentum.last_step, "mean_step": self._mean_step}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`."""
-        self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
-
     def state(self) -> dict[str, Any]:
-        """Entries of the checkpoint of a simulation, with the fluid."""
-        return {"fluid": self.fluid.checkpoint(), "coupling": self.checkpoint()}
+        """Entries of the checkpoint of a simulation: the fluid, and what the next step depends on beside the forces."""
+        steps = {"last_step": self.momentum.last_step, "mean_step": self._mean_step}
+        return {"fluid": self.fluid.checkpoint(), "coupling": steps}
 
     def take_over(self, state: dict[str, Any]) -> None:
         """Continue from a checkpoint of a simulation."""
         self.fluid.restore(state["fluid"])
-        self.restore(state["coupling"])
+        steps = state["coupling"]
+        self.momentum.last_step, self._mean_step = float(steps["last_step"]), float(steps["mean_step"])
 
     # ------------------------------------------------------------ terms
 
@@ -192,7 +186,8 @@ class Coupling:
         # forces act over the step: they see the mean of the solid fractions at its beginning and its end
         first = self.momentum.last_step == 0.0
         mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
-        terms.flow, terms.seen = self.flow.sample(particles, cell_map, solid, mean), self.flow.seen
+        terms.flow = self.flow.sample(particles, cell_map, solid, mean)
+        terms.seen_solids = self.flow.seen_solids
         return terms
 
     def _mapped_position(self, particles: Particles, step: float) -> Array:

@@ -11,9 +11,9 @@ from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import prange, threaded, vector_inline
 from cfddem.backend.errors import InputError
 from cfddem.coupling.terms import LINES, ForceTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 
 EXTERNAL = Field("external", "N", 3, meaning="force from outside, which the user may set at any time")

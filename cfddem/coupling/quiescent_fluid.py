@@ -23,9 +23,9 @@ from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import ForceTerms, total
 from cfddem.coupling.transfer import after_source, implicit_coefficients
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Plane

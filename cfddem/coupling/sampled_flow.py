@@ -23,10 +23,10 @@ import numpy as np
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.seen_solids import SeenSolids
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 
 
@@ -59,7 +59,7 @@ class Own(NamedTuple):
 
     modes: Array  # of its disturbance (N, modes, 3) [m/s]
     solid: Array  # solid fraction that it gathers from the cells (N,) [-]
-    seen: Array  # solid fraction that it sees, where surfaces are sharp (N,) [-]
+    solid_seen: Array  # solid fraction that it sees, where surfaces are sharp (N,) [-]
 
 
 def nothing_of_its_own(particles: Particles, cell_map: ParticleCellMap) -> Own:
@@ -77,7 +77,7 @@ class FlowSampler:
     kernel  gathers the fields of the fluid
     own     what every particle adds itself, which is taken away
     sizes   whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
-    seen    means that particles see, where surfaces of beds are sharp
+    seen_solids  means that particles see, where surfaces of beds are sharp
 
     fields  of the particles that it remembers from step to step
     """
@@ -88,7 +88,7 @@ class FlowSampler:
         self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
     ):
         self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
-        self.seen: SeenSolids | None = None
+        self.seen_solids: SeenSolids | None = None
 
     @classmethod
     def of_forces(cls, fluid: FluidSolver, kernel: FilterKernel, forces: Iterable[FluidForce]) -> FlowSampler:
@@ -239,14 +239,14 @@ class SharpFlowSampler(FlowSampler):
         self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
     ) -> None:
         super().__init__(fluid, kernel, own, sizes)
-        self.seen = SeenSolids(kernel)
+        self.seen_solids = SeenSolids(kernel)
 
     def sample(
         self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None
     ) -> SampledFlow:
         """See `FlowSampler.sample`."""
-        assert self.seen is not None
-        solids = _Solids(self.seen.around(cell_map), self.seen.change, particles[SEEN.name])
+        assert self.seen_solids is not None
+        solids = _Solids(self.seen_solids.around(cell_map), self.seen_solids.change, particles[SEEN.name])
         gathered = self._means(particles, cell_map, solid if mean is None else mean)
         own = self.own(particles, cell_map)
         (slip, unseen), ratio = np.empty((2, particles.count, 3)), self._diameter_ratio(particles, cell_map, solid)
@@ -310,11 +310,11 @@ def _sample_one(n, gathered, solids, spheres, own, density, flow):
     share = min(max(own.solid[n] / max(cells, 1e-300), 0.0), 1.0)
     of_others = max(cells - share * own.solid[n], 0.0)
     flow.company[n] = of_others / max(cells, 1e-300)
-    own_share = min(max(own.seen[n] / max(around, 1e-300), 0.0), 1.0)
-    solid = max(around - own_share * own.seen[n], 0.0)
+    own_share = min(max(own.solid_seen[n] / max(around, 1e-300), 0.0), 1.0)
+    solid = max(around - own_share * own.solid_seen[n], 0.0)
     belongs = _share_of_surface(solids.change[n], gathered[n])
-    seen = solid if math.isnan(last) else 0.5 * (solid + last)
-    voidage = 1.0 - (belongs * seen + (1.0 - belongs) * of_others)
+    mean_solid = solid if math.isnan(last) else 0.5 * (solid + last)
+    voidage = 1.0 - (belongs * mean_solid + (1.0 - belongs) * of_others)
     narrowing, square = (1.0 - of_others) / voidage, 0.0
     for d in range(3):
         disturbed = 0.0
@@ -326,7 +326,7 @@ def _sample_one(n, gathered, solids, spheres, own, density, flow):
         slip = between - narrowing * share * disturbed - velocity
         flow.slip[n, d], flow.unseen[n, d] = slip, fluid - velocity - slip / narrowing
         square += slip * slip
-    flow.others[n] = max(around - own.seen[n], 0.0) / spheres.volume[n]
+    flow.others[n] = max(around - own.solid_seen[n], 0.0) / spheres.volume[n]
     flow.solid[n], flow.voidage[n], flow.narrowing[n] = solid, voidage, narrowing
     scale = density * 2.0 * spheres.radius[n] / max(spheres.viscosity[n], 1e-300)
     flow.reynolds[n] = scale * voidage * math.sqrt(square)

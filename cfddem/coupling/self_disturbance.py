@@ -34,10 +34,10 @@ from cfddem.coupling.seen_solids import cells_of
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
 from cfddem.coupling.self_disturbance_walls import OwnSolids, WallsOfGrid, at_shares, shares_in_cell
 from cfddem.coupling.terms import CouplingTerms, total
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 from closures.disturbance import wake_decay
 

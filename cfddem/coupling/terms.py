@@ -133,7 +133,7 @@ class CouplingTerms(ForceTerms):
     """
 
     implicit: ImplicitCoefficients
-    seen: SeenSolids | None = None  # means that particles see, where surfaces are sharp
+    seen_solids: SeenSolids | None = None  # means that particles see, where surfaces are sharp
     source: Array | None = None  # explicit force on the fluid (nz, ny, nx, 3) [N/m3]
 
     def __init__(

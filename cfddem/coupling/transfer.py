@@ -37,9 +37,9 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
-from cfddem.data.fields import Field, Table
 from cfddem.fluid.grid import Array
 from cfddem.fluid.momentum import implicitness
+from cfddem.model.fields import Field, Table
 from cfddem.particles.state import Particles
 from closures.kinds import HEAT_ARGUMENTS
 from closures.registry import Law

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.fluid.fields import CellField
 from cfddem.io.quantities import Quantity
 from cfddem.model.feature import Equipment
+from cfddem.model.fields import Field
 
 
 class Measured(NamedTuple):

@@ -21,11 +21,11 @@ import numpy as np
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import serial
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
 from cfddem.features.heat import LEAST, mean_temperature
 from cfddem.features.heat_keys import Heat
+from cfddem.model.fields import Field
 from cfddem.particles.pair_graph import shifts
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles

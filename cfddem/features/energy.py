@@ -14,11 +14,11 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.terms import LINES, CouplingTerms
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature
 from cfddem.fluid import budgets
 from cfddem.fluid.grid import Array
 from cfddem.io.quantities import Quantity
+from cfddem.model.fields import Field
 from cfddem.particles.energy_count import EVERY_CHANNEL, Energies
 from cfddem.particles.state import Particles, added_mass_energy, kinetic_energy
 

@@ -15,8 +15,8 @@ from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.particle_properties import SPECIES, diameters_of
 from cfddem.case.patches import PLANES, CasePatch, along, middle_of
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.model.fields import Field
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles

@@ -25,7 +25,6 @@ from cfddem.backend.portions import Portions
 from cfddem.case.patch_faces import brought_in
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
 from cfddem.features.vapour import Vapour
@@ -33,6 +32,7 @@ from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.fields import Field
 
 RECEIVED = ("heat_from_fluid", "J")
 """Name and unit of the field with the heat that a particle received in the last step."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.model.fields import Field
 from cfddem.particles.agglomerates import AgglomerateSizes, agglomerates, carried_liquid, sizes, summary
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver

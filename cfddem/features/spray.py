@@ -22,11 +22,11 @@ from cfddem.backend.compile import serial
 from cfddem.backend.counter_random import philox
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 
 INSIDE = Field("zone_inside", dtype=bool, initial=True, meaning="the particle is in the spray zone")

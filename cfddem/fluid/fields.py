@@ -15,9 +15,9 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.portions import Portions
-from cfddem.data.fields import Role
 from cfddem.fluid.block import in_portions
 from cfddem.fluid.grid import LOW, Array, Grid
+from cfddem.model.fields import Role
 
 
 @dataclass(frozen=True)

@@ -127,16 +127,13 @@ def _require_grid(grid: Any) -> None:
         raise ValueError("grid is not a table of cells, spacing and origin")
     for name, values in grid.items():
         good = isinstance(values, list) and len(values) == 3 and all(_is_number(number) for number in values)
-        if not good or (name != "origin" and min(values) <= 0) or (name == "cells" and not _are_whole(values)):
+        whole = name != "cells" or (good and all(isinstance(number, int) for number in values))
+        if not good or not whole or (name != "origin" and min(values) <= 0):
             raise ValueError(f"grid.{name} is not three numbers")
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
-
-
-def _are_whole(values: list[Any]) -> bool:
-    return all(isinstance(number, int) for number in values)
 
 
 def require_columns(columns: Mapping[str, np.ndarray]) -> None:

@@ -46,7 +46,7 @@ class Declaration(Protocol):
 def of_fields(fields: Iterable[Declaration]) -> dict[str, Quantity]:
     """The quantities of declared fields, by name.
 
-    >>> from cfddem.data.fields import Field
+    >>> from cfddem.model.fields import Field
     >>> of_fields([Field("radius", "m", meaning="radius")])
     {'radius': Quantity(unit='m', meaning='radius', group='')}
     """

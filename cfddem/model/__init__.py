@@ -1,1 +1,1 @@
-"""What a simulation is made of: features and their kinds."""
+"""What a simulation is made of: declared fields, tables of them, and features of its kinds."""

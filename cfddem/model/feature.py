@@ -13,7 +13,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.portions import Portions
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 
 Function = Callable[[Any], Any]
 """The force on each of the particles, (N, 3), or (3,) for all [N]."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cfddem.backend.compile import inline
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.kinematics import (
     pair_mass_and_radius,
     pair_row,

@@ -21,7 +21,7 @@ import numpy as np
 from cfddem.backend.compile import CHUNKS, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, specialise
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.energy_of_bridges import BONDS, BRIDGES, DRYING_BRIDGES
 from cfddem.particles.energy_of_contacts import (
     CHANNELS,

@@ -2,7 +2,7 @@
 
 Space is divided among the ranks. At every new neighbour list each particle moves to the rank that owns its place, with
 all its fields and with what its pairs remember. Then each rank receives copies of all particles that its own particles
-may meet before the next list. Between two lists ranks send the fields of a phase (:class:`cfddem.data.fields.Field`).
+may meet before the next list. Between two lists ranks send the fields of a phase (:class:`cfddem.model.fields.Field`).
 
 Both owners of a pair compute it, from the same numbers in the same order, so that a run has the same bits for any
 division of space.
@@ -21,7 +21,7 @@ from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.portions import slices
-from cfddem.data.fields import Phase
+from cfddem.model.fields import Phase
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.interactions.bridge_changes import share_wall_liquid

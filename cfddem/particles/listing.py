@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.ghosts import DividedDomain, SingleDomain
 from cfddem.particles.interactions.laws import Laws

@@ -16,7 +16,7 @@ import numpy as np
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.pair_graph import HOME, THICKEST, Edges, Graph, make_edges, of_two_spheres, shifts
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at

@@ -7,8 +7,8 @@ The first body of a pair is the particle with the lower id. The list of the edge
 may touch, sorted by the ids of the other particles; walls follow, by wall and then by triangle; pairs that cannot touch
 come last. So forces, and their sum over the edges of a particle, have the same bits for any order of the rows.
 
-What a pair remembers is declared by the laws of a run as fields (:mod:`cfddem.data.fields`). New lists, checkpoints and
-the arrays of compiled loops are made from the declarations.
+What a pair remembers is declared by the laws of a run as fields (:mod:`cfddem.model.fields`). New lists, checkpoints
+and the arrays of compiled loops are made from the declarations.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.named import named_arrays
-from cfddem.data.fields import Field, Table
+from cfddem.model.fields import Field, Table
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
 from cfddem.particles.walls.nearest_point import (

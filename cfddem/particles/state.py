@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.named import named_arrays
-from cfddem.data.fields import Field, Phase, Table
+from cfddem.model.fields import Field, Phase, Table
 
 PARTICLE_FIELDS = (
     Field("position", "m", 3, halo=("start", "motion"), snapshot=True, meaning="position of the centre"),

@@ -109,7 +109,8 @@ def _particles(axes: Axes, case: Case) -> None:
         if rows * columns > MOST_SPHERES:
             axes.add_patch(Rectangle(corner, *size, facecolor=BLUE, alpha=0.35, linewidth=0))
             return
-        share = 1.0 if bed.start == "poured" else min(1.0, 1.5 * _solid_fraction(case))
+        solids = sum(case.volumes.values()) / max(size[0] * size[1] * case.column.size[1], 1e-300)
+        share = 1.0 if bed.start == "poured" else min(1.0, 1.5 * solids)
         centres = _lattice(corner, size, diameter)
         kept = np.random.default_rng(1).random(len(centres)) < share
         centres = centres[kept]
@@ -135,11 +136,6 @@ def _start(case: Case) -> tuple[tuple[float, float], tuple[float, float]]:
             estimate = estimate_bed(case)
             height = min(height, estimate.poured_height if bed.start == "poured" else estimate.height)
     return (0.0, 0.0), (width, height)
-
-
-def _solid_fraction(case: Case) -> float:
-    size = _start(case)[1]
-    return sum(case.volumes.values()) / max(size[0] * size[1] * case.column.size[1], 1e-300)
 
 
 def _lattice(corner: tuple[float, float], size: tuple[float, float], diameter: float) -> np.ndarray:

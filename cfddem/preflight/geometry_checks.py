@@ -142,16 +142,14 @@ def bed_key(case: Case, word: str) -> str:
 
 def _largest_overlap(positions: np.ndarray, diameter: float) -> tuple[float, tuple[int, int]]:
     """Largest overlap of equal spheres over their diameter, and the rows of the pair."""
-    largest, rows = 0.0, (0, 0)
-    order = np.argsort(positions[:, 2])
-    for k, row in enumerate(order):
-        above = order[k + 1 :]
-        above = above[: np.searchsorted(positions[above, 2], positions[row, 2] + diameter)]
-        if len(above):
-            overlap = diameter - np.linalg.norm(positions[above] - positions[row], axis=1)
-            if overlap.max() > largest:
-                largest, rows = float(overlap.max()), (int(row), int(above[np.argmax(overlap)]))
-    return largest / diameter, rows
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(positions).query_pairs(diameter, output_type="ndarray")
+    if not len(pairs):
+        return 0.0, (0, 0)
+    distance = np.linalg.norm(positions[pairs[:, 0]] - positions[pairs[:, 1]], axis=1)
+    first, second = pairs[np.argmin(distance)].tolist()
+    return 1.0 - float(distance.min()) / diameter, (first, second)
 
 
 # ---------------------------------------------------------------- units

@@ -17,7 +17,6 @@ from cfddem.case.schema import Case
 from cfddem.case.wall_geometry import (
     corners_of,
     distance,
-    enclosed_volume,
     extent,
     inside_surface,
     is_closed,
@@ -26,6 +25,7 @@ from cfddem.case.wall_geometry import (
 )
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
+from cfddem.fluid.triangles import signed_volume
 from cfddem.preflight.issue import Issue, Severity, percent
 
 MANY_TRIANGLES, MOST_TRIANGLES, LARGEST_FILE = 200_000, 2_000_000, 1_000_000_000
@@ -103,7 +103,7 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "the fluid does not feel the motion of a wall: at its cells the velocity is 0",
             "the motion acts on particles that touch the wall",
         )  # fmt: skip
-    if _is_periodic(case) and not _repeats(case, wall):
+    if any(case.column.periodic) and not _repeats(case, wall):
         yield Issue(
             "error", key, f"a {wall.shape} is not the same all along the periodic sides of the column",
             'set column.sides or column.front to "no_slip"; only planes and endless cylinders along them repeat',
@@ -167,7 +167,7 @@ def _check_vessel(case: Case, wall: CaseWall, key: str, corners: np.ndarray) -> 
     room = sum(case.volumes.values()) / POURED_SOLID_FRACTION
     if not len(places) or not is_closed(corners) or case.closes_cells(wall):
         return
-    if enclosed_volume(corners) > room and not inside_surface(corners, places).any():
+    if abs(signed_volume(corners)) > room and not inside_surface(corners, places).any():
         yield Issue(
             "warning", f"{key}.file", "all particles start outside of this closed surface, which has room for them",
             "move bed.start_corner or bed.positions into it if it is their vessel",
@@ -253,10 +253,6 @@ def leaking_share(case: Case, wall: CaseWall, closed: dict[int, np.ndarray]) -> 
         leaking, stopped = float(within.sum()), 0.5 * float((here ^ there).sum())  # a line enters and leaves the wall
         worst = max(worst, leaking / max(leaking + stopped, 1.0))
     return worst
-
-
-def _is_periodic(case: Case) -> bool:
-    return any(case.column.periodic)
 
 
 def _repeats(case: Case, wall: CaseWall) -> bool:

@@ -47,7 +47,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Turned, Wall
 from cfddem.run.division import cells_of, space_of
-from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
+from cfddem.run.initial_particles import particles_of
 from cfddem.run.patches import with_patches
 from closures.added_mass import zuber
 from closures.registry import Law, law_of
@@ -83,7 +83,7 @@ def parts_of(
     dry, cells = not case.has_fluid, cells_of(case, spheres.position, communicator)
     division = space_of(case, spheres.position, communicator, cells)
     if division is not None:
-        wrap(spheres.position, np.array([math.inf if length is None else length for length in periodic_box(case)]))
+        wrap(spheres.position, np.where(case.column.periodic, case.column.size, math.inf))
         spheres = handed_out(spheres, division, communicator)
     solver = ParticleSolver(
         spheres,
@@ -91,7 +91,7 @@ def parts_of(
         walls=walls,
         laws=laws,
         gravity=case.laws.gravity if dry else (0.0, 0.0, 0.0),
-        box=periodic_box(case),
+        box=case.column.periodic_lengths,
         domain=_domain(case),
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
@@ -147,7 +147,7 @@ def flow_of(
     )
     kernel = FilterKernel(
         grid,
-        periodic_directions(case),
+        case.column.periodic,
         mapping=case.laws.mapping,
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
         sizes=kernels_of(case),
@@ -201,7 +201,7 @@ def walls_of(case: Case) -> list[Wall]:
     if case.column.shape == "cylinder":
         walls.append(Cylinder(point=(0.5 * width, 0.5 * width, 0.0), radius=0.5 * width, material=solid))
         return [*walls, *case_walls(case, solid)]
-    for axis, length, repeats in zip((0, 1), (width, depth), periodic_directions(case)):
+    for axis, length, repeats in zip((0, 1), (width, depth), case.column.periodic):
         if not repeats:
             inward = np.eye(3)[axis]
             walls.append(Plane(normal=tuple(inward), material=solid))
@@ -266,7 +266,7 @@ def _bond_of(bond: Bond | None) -> BondLaw | None:
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Corners of the box that no centre may leave; infinite along periodic directions [m]."""
-    repeats, size = periodic_directions(case), case.column.size
+    repeats, size = case.column.periodic, case.column.size
     low = tuple(-math.inf if is_periodic else 0.0 for is_periodic in repeats)
     high = tuple(math.inf if is_periodic else length for is_periodic, length in zip(repeats, size))
     return low, high  # type: ignore[return-value]

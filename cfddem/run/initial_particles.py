@@ -46,7 +46,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         with _box_named_as_in(case):
             spheres = poured_bed(
                 Spheres(table, diameters, properties.density, properties.material, _layer(case, properties)),
-                Place(walls, *start_box(case), periodic_box(case)),
+                Place(walls, *start_box(case), case.column.periodic_lengths),
                 seed=bed.seed,
                 gravity=abs(case.laws.gravity[2]),
                 laws=laws.dry(),
@@ -56,7 +56,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     elif bed.start in ("packed", "expanded"):
         space = (*case.column.size[:2], case.column.height if bed.start == "packed" else expanded_height(case))
         share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(space)
-        x, y, z = periodic_directions(case)
+        x, y, z = case.column.periodic
         repeats = (x, y, z or bed.fixed)  # fixed particles are a slice of a longer bed
         places, _ = random_packing(diameters, share, bed.seed, shape=space, periodic=repeats)
     elif bed.start == "placed":
@@ -181,7 +181,7 @@ def _layer(case: Case, properties: ParticleProperties) -> np.ndarray | None:
 
 def in_the_box(places: Array, case: Case) -> Array:
     """The places, brought back into the column along its periodic directions (N, 3) [m]."""
-    periodic, size = np.array(periodic_directions(case)), np.array(case.column.size)
+    periodic, size = np.array(case.column.periodic), np.array(case.column.size)
     inside: Array = places - periodic * size * np.floor(places / size)
     return inside
 
@@ -196,14 +196,3 @@ def _must_be_inside(position: Array, case: Case) -> None:
         row = int(np.argmax(outside))
         remedy = "set bed.start_corner and bed.start_size"
         raise InputError(f"position of particle {row}", position[row].tolist(), "inside the vessel", remedy)
-
-
-def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
-    """Whether x, y, z are periodic."""
-    return case.column.periodic
-
-
-def periodic_box(case: Case) -> tuple[float | None, float | None, float | None]:
-    """Lengths of the periodic directions [m], None along the others."""
-    x, y, z = (length if repeats else None for length, repeats in zip(case.column.size, periodic_directions(case)))
-    return x, y, z

@@ -18,10 +18,10 @@ from cfddem.case.schema import Case
 from cfddem.coupling.coupling import Coupling, Uncoupled
 from cfddem.coupling.force_list import require_features
 from cfddem.coupling.terms import ForceTerms
-from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce
+from cfddem.model.fields import Field
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, particles_in
 from cfddem.run.build import Parts, parts_of

@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
 
 import numpy as np
 
@@ -27,13 +26,9 @@ from closures.compiled import cache_folder
 
 def is_new() -> bool:
     """Whether the loops of the fluid are missing in the cache for the threads in use; one of them is checked."""
-    return not _is_cached(transport.in_use)
-
-
-def _is_cached(loop: Any) -> bool:
-    """Whether the cache holds a compiled loop, under the name of its file and its own."""
+    loop = transport.in_use
     name = f"{loop.__module__.rpartition('.')[2]}.{loop.__qualname__}"
-    return any(cache_folder().rglob(f"{name}-*.nbi"))
+    return not any(cache_folder().rglob(f"{name}-*.nbi"))
 
 
 def _cores() -> int:

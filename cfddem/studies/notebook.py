@@ -14,10 +14,10 @@ from typing import Any
 from cfddem.backend.compile import announce_compilation
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.io.folder import read_about
 from cfddem.io.reading import RunData, open_run
 from cfddem.model.feature import Feature, Function
+from cfddem.model.fields import Field
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run import runner
 from cfddem.run.progress import Status, live_line

@@ -14,8 +14,8 @@ import pytest
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.transfer import ImplicitCoefficients, Transfer
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array, Grid
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles, make_particles
 
 TEMPERATURE = Field("temperature", "K", initial=300.0, snapshot=True, meaning="temperature")

@@ -7,8 +7,8 @@ import pytest
 from in_process_ranks import on_ranks
 
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field
 from cfddem.features.spray import Spray, box, cone
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles, make_particles
 
 DROP = 1e-13

@@ -10,7 +10,7 @@ import pytest
 
 import cfddem
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field, Table
+from cfddem.model.fields import Field, Table
 from cfddem.particles.state import PARTICLE_FIELDS, Particles, make_particles
 
 FIELDS = (

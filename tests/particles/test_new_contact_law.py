@@ -16,8 +16,8 @@ from command_line import call
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.energy import EnergyLedger
+from cfddem.model.fields import Field
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named, register
 from cfddem.particles.interactions.laws import Laws, check_contact_law, contact_choices

@@ -14,7 +14,7 @@ from disturbed_runs import TINY
 from cfddem import open_run
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.state import make_particles
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation

@@ -37,9 +37,9 @@ from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import CouplingTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles, added_mass
 from closures.registry import Law
 

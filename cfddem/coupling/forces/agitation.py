@@ -35,10 +35,10 @@ from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow, Seen
 from cfddem.coupling.terms import CouplingTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 from closures.agitation import SHORT, AgitationFactors, force_deviation, force_rate, isolated_drag_factor
 from closures.kinds import AGITATION_ARGUMENTS

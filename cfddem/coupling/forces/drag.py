@@ -29,9 +29,9 @@ from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import ForceTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 from closures.kinds import DRAG_ARGUMENTS
 from closures.registry import Law, law_of
@@ -84,7 +84,7 @@ class Drag(FluidForce):
         drag = self._alone[:, None] * slip
         density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
         in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
-        in_solids = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen.averaged(drag / volume)
+        in_solids = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen_solids.averaged(drag / volume)
         rest = volume * (in_solids - flow.company[:, None] * in_cells)
         terms.push("drag", rest)
         terms.particles[OWED.name][:] = terms.step * rest

@@ -37,9 +37,9 @@ from cfddem.backend.compile import fused, inline, prange, threaded, vector_part
 from cfddem.backend.law_set import Slot, specialise
 from cfddem.coupling.sampled_flow import SampledFlow, Seen
 from cfddem.coupling.terms import ForceTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import NOTHING, minus, of_row, plus, times
 from closures.history import (

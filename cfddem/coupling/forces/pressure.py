@@ -8,10 +8,10 @@ import numpy as np
 
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap, Stencil
 from cfddem.coupling.terms import CouplingTerms, ForceTerms
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 
 MAPPED_EARLIER = Field(

@@ -21,7 +21,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.slots import BOND
 from cfddem.particles.pair_graph import geometry

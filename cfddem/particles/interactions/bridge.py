@@ -16,7 +16,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.bridge_solution import at_gap, held_gap
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import (

@@ -19,7 +19,7 @@ each side of an instant: for one of both where the bridge comes from the joint s
 from __future__ import annotations
 
 from cfddem.backend.compile import inline, part, prange, serial
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.bridge import renew_bridge
 from cfddem.particles.interactions.slots import BRIDGE_SLIDING
 from cfddem.particles.pair_graph import edge_role, places_of

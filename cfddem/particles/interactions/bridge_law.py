@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.backend.law_set import bind_arguments, check_compiles
 from cfddem.backend.named import can_be_named
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS, WET_FIELDS
 from cfddem.particles.interactions import bond as solid_bond
 from cfddem.particles.interactions.bond import BondLaw

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from cfddem.backend.compile import inline
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.slots import (
     DAMPING_MEAN,
     FILM,

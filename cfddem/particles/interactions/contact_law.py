@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.material_pairs import PAIR
 from cfddem.particles.step_criteria import stiffness_steps
 from closures.registry import load_package_laws

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import inline
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.film_law import at_gap, at_least
 from cfddem.particles.interactions.kinematics import (
     pair_mass_and_radius,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.film import LEAP, WEAK, WEAK_FIELDS, record_approach
 from cfddem.particles.interactions.kinematics import (
     pair_mass_and_radius,

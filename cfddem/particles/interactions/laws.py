@@ -12,7 +12,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import bind_arguments, check_compiles, compile_source
 from cfddem.backend.named import NAMES, can_be_named
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.interactions import bond, bridge, bridge_apart, contact, film, joint_films, rolling, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGES, BridgeLaws, NoBridges

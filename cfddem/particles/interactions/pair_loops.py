@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.backend.compile import inline, kept_whole, prange, vector_part
 from cfddem.backend.law_set import compile_source, specialise
 from cfddem.backend.named import named_arrays
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, thinnest_film
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_apart import resist_apart

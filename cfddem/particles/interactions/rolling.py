@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from cfddem.backend.compile import inline
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.slots import FILM, rolling_torque, secant_stiffness
 from cfddem.particles.vectors import LEAST, NOTHING, across, dot, plus, select, times
 from closures.blend import contact_share

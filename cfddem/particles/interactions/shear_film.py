@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import inline
-from cfddem.data.fields import Field
+from cfddem.model.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
 from cfddem.particles.interactions.slots import SHEAR, TWIST, film_sliding
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times

@@ -138,23 +138,35 @@ class Box(Wall):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cylinder(Wall):
-    """A round wall about an axis.
+class Round(Wall):
+    """A wall that is turned about an axis.
+
+    point  on the axis: centre of the lower end of a wall with ends [m]
+    axis   direction, upward from there; need not be of unit length
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+
+    def sweep(self) -> float:
+        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
+        return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Round):
+    """A round wall of one radius.
 
     An infinite cylinder, or one with caps, keeps particles on one side. A finite open one is a tube that particles
     touch from both sides and at the rims. Let a tube on a cone or a plane reach a little beyond it, so that no rim
     lies in the corner.
 
-    point    on the axis; centre of the lower end of a finite one [m]
-    axis     direction, from the lower end; need not be of unit length
     radius   [m]
     length   [m]; infinite if not given
     caps     flat ends
     outside  particles are outside
     """
 
-    point: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
     radius: float
     length: float | None = None
     caps: bool = False
@@ -188,21 +200,18 @@ class Cylinder(Wall):
         return self.length is None and not across and int(periodic.sum()) == 1
 
     def sweep(self) -> float:
-        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
-        axis, in_place = _unit(self.axis), self._spins_along(self.axis, self.point)
-        if self.length is None and not in_place:
+        """As of all round walls; one without end may also move along its axis [m/s]."""
+        if self.length is not None:
+            return super().sweep()
+        if not self._spins_along(self.axis, self.point):
             raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
-        if self.length is None:
-            return float(np.linalg.norm(np.cross(self.velocity, axis)))
-        return float(np.linalg.norm(self.velocity)) if in_place else super().sweep()
+        return float(np.linalg.norm(np.cross(self.velocity, _unit(self.axis))))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cone(Wall):
+class Cone(Round):
     """A round wall whose radius changes along its axis, open at both ends, with contacts on both sides: a hopper.
 
-    point       centre of the lower end [m]
-    axis        direction, from the lower end; need not be of unit length
     radius      of the lower end, the outlet; may be 0 [m]
     top_radius  of the upper end [m]
     length      [m]
@@ -211,8 +220,6 @@ class Cone(Wall):
     (0.0, 0.0, 0.0)
     """
 
-    point: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
     radius: float = 0.0
     top_radius: float
     length: float
@@ -233,26 +240,19 @@ class Cone(Wall):
         top = np.add(self.point, self.length * _unit(self.axis))
         return np.array([self.point, top]), max(self.radius, self.top_radius)
 
-    def sweep(self) -> float:
-        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
-        return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
-
 
 @dataclass(frozen=True, kw_only=True)
-class Turned(Wall):
+class Turned(Round):
     """A round vessel around the particles: a line turned about an axis, as `cfddem.fluid.surfaces.turned`.
 
     Where the vessel is hollow between two pieces, both go on straight behind each other, so that a sphere in the corner
     touches each once. Where an edge stands out into the vessel, the two pieces end there.
 
-    line   heights along the axis, which rise, and radii, at least two; the first and the last piece go on straight [m]
-    point  on the axis, from which heights count [m]
-    axis   direction; need not be of unit length
+    line   heights along the axis from `point`, which rise, and radii, at least two; the first and the last piece go on
+           straight [m]
     """
 
     line: tuple[tuple[float, float], ...]
-    point: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
         points = np.asarray(self.line, float)
@@ -282,10 +282,6 @@ class Turned(Wall):
     def frame(self) -> tuple[np.ndarray, float]:
         points, axis = np.asarray(self.line, float), _unit(self.axis)
         return np.array([np.add(self.point, z * axis) for z in points[:, 0]]), float(points[:, 1].max())
-
-    def sweep(self) -> float:
-        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
-        return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -34,9 +34,23 @@ class Discharge:
 def beverloo(case: Case) -> float:
     """Discharge of the first wall, a cone, by Beverloo with a correction for its angle [kg/s]."""
     cone = case.wall[0]
-    slope = ((cone.top_radius or 0.0) - (cone.radius or 0.0)) / (cone.length or 1.0)
-    bulk, gravity = POURED_SOLID_FRACTION * case.solid.density, math.hypot(*case.laws.gravity)
-    flat = laws_of_discharge.beverloo(bulk, 2.0 * (cone.radius or 0.0), case.bed.diameter, gravity)
+    orifice = cone.radius or 0.0
+    return of_cone(case, orifice, ((cone.top_radius or 0.0) - orifice) / (cone.length or 1.0))
+
+
+def bulk_of(case: Case) -> float:
+    """Density of a poured bed [kg/m3]."""
+    return POURED_SOLID_FRACTION * case.solid.density
+
+
+def of_cone(case: Case, orifice: float, slope: float) -> float:
+    """Discharge through the lower end of a cone, without air [kg/s].
+
+    orifice  its radius [m]
+    slope    increase of the radius with height [-]
+    """
+    gravity = math.hypot(*case.laws.gravity)
+    flat = laws_of_discharge.beverloo(bulk_of(case), 2.0 * orifice, case.bed.diameter, gravity)
     return flat * laws_of_discharge.cone_factor(slope)
 
 

@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.case.bed import POURED_SOLID_FRACTION
+from cfddem.analysis.report import case_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, RED, label, legend, panels, save
-from closures import discharge as laws_of_discharge
+from closures.discharge import air_factor
+from scenarios.beds.hopper.study import bulk_of, of_cone
 from scenarios.beds.vessel_slice import draw_spheres, draw_vessel
 
 BLOCKS = 6
@@ -53,22 +54,11 @@ class Discharge:
         )
 
 
-def case_of(run: RunData) -> Case:
-    """The case of a run."""
-    return Case.from_text(run.case_text, finished=True)
-
-
-def bulk_of(case: Case) -> float:
-    """Density of a poured bed [kg/m3]."""
-    return POURED_SOLID_FRACTION * case.solid.density
-
-
 def beverloo(case: Case) -> float:
     """Discharge of the cone, the second piece of the vessel, without air: by Beverloo with a correction for its angle
     [kg/s]."""
     (low, orifice), (high, width) = case.line[1:3]
-    flat = laws_of_discharge.beverloo(bulk_of(case), 2.0 * orifice, case.bed.diameter, math.hypot(*case.laws.gravity))
-    return flat * laws_of_discharge.cone_factor((width - orifice) / (high - low))
+    return of_cone(case, orifice, (width - orifice) / (high - low))
 
 
 def discharge(run: RunData, case: Case) -> Discharge:
@@ -80,7 +70,7 @@ def discharge(run: RunData, case: Case) -> Discharge:
     late = [n for n, time in enumerate(run.times) if time >= begin]
     gradient = float(np.mean([_at_orifice(run, case, n)[0] for n in late]))
     air = float(np.mean([_at_orifice(run, case, n)[1] for n in late]))
-    factor = laws_of_discharge.air_factor(gradient / (bulk_of(case) * math.hypot(*case.laws.gravity)))
+    factor = air_factor(gradient / (bulk_of(case) * math.hypot(*case.laws.gravity)))
     return Discharge(case.patch["orifice"].pressure or 0.0, rate, error, air, gradient, factor)
 
 

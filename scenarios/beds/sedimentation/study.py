@@ -22,8 +22,8 @@ from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.plotting.curves import BLUE, GREY, label, legend, panels, save
 from cfddem.run.simulation import Simulation
-from closures.balance import terminal_velocity
 from closures.bed import exponent_richardson_zaki
+from scenarios.beds.settling.study import unbounded
 
 SOLID_FRACTIONS = (0.05, 0.1, 0.2, 0.3, 0.4)
 SYRUP = 1.4e-2
@@ -50,14 +50,6 @@ def vessel() -> Case:
     return gallery()["sedimentation"]
 
 
-def alone(case: Case) -> float:
-    """Terminal velocity of one sphere by the case's drag law [m/s]."""
-    assert case.laws.drag_law is not None
-    fluid = case.required_fluid
-    drag, gravity = case.laws.drag_law.function, abs(case.laws.gravity[2])
-    return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, drag, gravity)
-
-
 def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, distance: float = 40.0) -> Settling:
     """Let the spheres of the case settle in a periodic box.
 
@@ -78,7 +70,7 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, di
             "bed.count": count,
         }
     )  # fmt: skip
-    speed = alone(case)
+    speed = unbounded(case)
     case = case.with_(**{"run.reference_speed": 0.5 * speed})
     simulation = Simulation(case)
     fluid, particles = simulation.fluid, simulation.particles
@@ -104,7 +96,7 @@ def between_walls(solid_fraction: float, *, fall: float = 0.45) -> Settling:
     volume = math.pi / 6.0 * case.bed.diameter**3
     count = round(solid_fraction * math.prod(case.column.size) / volume)
     simulation = Simulation(case.with_(**{"bed.count": count}))
-    particles, speed = simulation.particles, alone(case)
+    particles, speed = simulation.particles, unbounded(case)
     solids = count * volume / math.prod(case.column.size)
     packed = 1.0 - solids / 0.58  # largest fall of the boundary over the height
     end, rows = min(fall, 0.7 * packed) * case.column.height / (speed * (1.0 - solids) ** 3), 90

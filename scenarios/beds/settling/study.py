@@ -172,10 +172,15 @@ def mordant() -> Case:
     return gallery()["settling"]
 
 
-def unbounded(case: Case, drag: str) -> float:
-    """Terminal velocity of the sphere of a case by a drag law, alone in an endless fluid [m/s]."""
-    law, fluid, gravity = REGISTRY["drag"][drag].function, case.required_fluid, abs(case.laws.gravity[2])
-    return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
+def unbounded(case: Case, drag: str = "") -> float:
+    """Terminal velocity of a sphere of a case, alone in an endless fluid, by a drag law; by that of the case if empty
+    [m/s]."""
+    law = REGISTRY["drag"][drag] if drag else case.laws.drag_law
+    assert law is not None
+    fluid, gravity = case.required_fluid, abs(case.laws.gravity[2])
+    return terminal_velocity(
+        case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law.function, gravity
+    )
 
 
 def ten_cate(density: float, viscosity: float) -> Case:

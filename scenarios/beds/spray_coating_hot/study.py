@@ -2,8 +2,8 @@
 
 Both runs have the same beads, nozzle, spray and volume flow of air. Nothing is fitted.
 
-`python -m scenarios.beds.spray_coating_hot.study FOLDER` runs the case with cold air; with a third word, the liquid at
-the start over the volume of the beads, for 0.8 s.
+`python -m scenarios.beds.spray_coating_hot.study FOLDER` runs the case with cold air; with one more word, the liquid at
+the start over the volume of the beads, for 0.8 s. With HOT COLD OUTPUT.png it draws two runs.
 """
 
 from __future__ import annotations
@@ -84,13 +84,7 @@ def moisture(run: RunData) -> np.ndarray:
     return np.asarray((history["liquid_on_particles"] + history["liquid_in_bridges"]) / sum(described.volumes.values()))
 
 
-if __name__ == "__main__":
-    Run.begin(case(True, *map(float, sys.argv[2:3])), Path(sys.argv[1])).go()
-
-
-# ---------------------------------------------------------------- figure
-#
-# `python -m scenarios.beds.spray_coating_hot.study HOT COLD OUTPUT.png` draws two runs.
+# ---------------------------------------------------------------- figure of the coater
 
 
 def figure(hot: Path, cold: Path, output: Path) -> None:
@@ -112,4 +106,7 @@ def figure(hot: Path, cold: Path, output: Path) -> None:
 
 
 if __name__ == "__main__":
-    figure(*(Path(path) for path in sys.argv[1:4]))
+    if len(sys.argv) == 4:
+        figure(*map(Path, sys.argv[1:]))
+    else:
+        Run.begin(case(True, *map(float, sys.argv[2:])), Path(sys.argv[1])).go()

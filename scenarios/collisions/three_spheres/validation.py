@@ -19,9 +19,8 @@ from closures.restitution import davis_sitison
 from scenarios.collisions.three_spheres import figures
 from scenarios.collisions.three_spheres.study import Triplet, outcomes, simulate_three_spheres
 from scenarios.references.three_spheres.cartesian import cartesian
-from scenarios.validation.table import Columns, Row, reference, worst
+from scenarios.validation.table import Curves, Row, reference, worst
 
-Curves = dict[str, Columns]
 hard_spheres = partial(simulate_three_spheres, solver="equations")
 
 UNPRINTED: tuple[dict[str, Any], ...] = (

@@ -20,9 +20,8 @@ from scenarios.collisions.immersed_pair.study import collide
 from scenarios.collisions.wet_wall.materials import ALUMINA, FRICTION, GLASS
 from scenarios.collisions.wet_wall.study import Impact, impact, sticking_velocity
 from scenarios.references.wet_wall.checks import independent
-from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
+from scenarios.validation.table import Columns, Curves, Row, worst
 
-Curves = dict[str, Columns]
 exact = partial(impact, solver="equations")
 CHANNELS = {"viscous": BLUE, "capillary": SKY, "contact": ORANGE, "gravity": GREY}
 SPEEDS = np.concatenate([np.arange(0.2, 1.59, 0.04), np.linspace(1.6, 3.0, 6)])
@@ -46,17 +45,6 @@ STICKING: tuple[tuple[str, str, float, float, float | None], ...] = (  # and the
     ("alumina_1.74", "water", 100e-6, 0.652, FLOOR),  # nearly singular: 0.673 without the floor
 )
 """Velocities below which spheres stick, with limits of 2 % [m/s]."""
-
-
-def study(folder: Path, progress: Progress) -> list[Row]:
-    """Run all parts, write histories and figures, and return the table."""
-    rows: list[Row] = []
-    curves: Curves = {}
-    for part in PARTS:
-        progress((part.__doc__ or "").splitlines()[0])
-        rows += part(folder, curves)
-    write_histories(folder / "wet_wall.h5", curves)
-    return rows
 
 
 def solution(_: Path, __: Curves) -> list[Row]:
