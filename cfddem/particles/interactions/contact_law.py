@@ -182,20 +182,20 @@ class ContactLaw:
         }
         for share in _SHARES_OF_DIAMETER:
             overlap, at = share * 4.0 * radius, f"at an overlap of {100.0 * share:g} % of a diameter"
-            found = {}
+            values = {}
             for name, function in numbers.items():
                 try:
-                    found[name] = self.evaluate(function, overlap, mass, radius, row)
+                    values[name] = self.evaluate(function, overlap, mass, radius, row)
                 except InputError as failure:
                     yield str(failure)
                     return
                 except Exception as failure:  # whatever a user's function raises
                     yield f"{name} fails ({failure}) {at}"
                     return
-                if not math.isfinite(found[name]):
-                    yield f"{name} is {found[name]} {at}"
+                if not math.isfinite(values[name]):
+                    yield f"{name} is {values[name]} {at}"
                     return
-            stiffness, damping = found["stiffness"], found["damping"]
+            stiffness, damping = values["stiffness"], values["damping"]
             if stiffness <= 0.0 or damping < 0.0:
                 limit = "stiffness must be positive, and damping not negative"
                 yield f"stiffness is {stiffness:.3g} N/m and damping {damping:.3g} kg/s {at}: {limit}"
