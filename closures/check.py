@@ -7,6 +7,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Iterator
+from numbers import Real
 
 from closures.drag import ergun
 from closures.kinds import ARGUMENTS, arguments_of
@@ -111,7 +112,10 @@ def _finite(entry: Law) -> Iterator[str]:
         except Exception as failure:  # whatever a user's function raises
             yield f"fails ({failure}) at {_shown(stated)}"
             return
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not isinstance(value, Real):
+            yield f"returns {value!r}, which is no number, at {_shown(stated)}"
+            return
+        if not math.isfinite(value):
             yield f"is {value} at {_shown(stated)}"
             return
 

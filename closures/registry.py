@@ -101,7 +101,8 @@ def _refuse_impossible(entry: Law) -> None:
     """Refuse a user's law whose name is taken, whose kind is unknown, or with a range that is none."""
     load_built_in_laws()
     if entry.kind not in REGISTRY:
-        raise ValueError(f"{entry.name}: kind = {entry.kind!r}: must be one of {', '.join(REGISTRY)}")
+        kinds = f"{', '.join(BUILT_IN)}, or another kind that `cfddem explain` lists"
+        raise ValueError(f"{entry.name}: kind = {entry.kind!r}: must be one of {kinds}")
     earlier = REGISTRY[entry.kind].get(entry.name)
     if earlier is not None and is_built_in(earlier.function):
         module = earlier.function.__module__

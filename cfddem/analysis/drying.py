@@ -52,7 +52,12 @@ class DryingRates:
         return self.sprayed / self.rate_constant
 
     def water_after(self, time: float) -> tuple[float, float]:
-        """Water after a time from the end of the window [s]: where the surface limits, and where the air does [kg]."""
+        """Water after a time from the end of the window [s]: where the surface limits, and where the air does [kg].
+
+        Evaporation rises with the water, at most in proportion. In a bed that grows wetter the first value is therefore
+        a lower bound and the second, a straight line without an end, an upper one; in a bed that dries it is the other
+        way round.
+        """
         by_surface = self.steady_water + (self.last - self.steady_water) * math.exp(-self.rate_constant * time)
         return by_surface, max(0.0, self.last + (self.sprayed - self.evaporated) * time)
 

@@ -1,11 +1,15 @@
-"""Laws chosen by the user: by name from the registry or an installed package, or as a function."""
+"""Laws chosen by the user: by name from the registry, an installed package or a file, or as a function."""
 
 from __future__ import annotations
 
 import inspect
 import math
+import sys
 from collections.abc import Callable, Sequence
 from functools import wraps
+from importlib.util import module_from_spec, spec_from_file_location
+from numbers import Real
+from pathlib import Path
 
 from cfddem.backend.errors import InputError, nearest, shown
 from closures import registry
@@ -24,7 +28,9 @@ def chosen(kind: str, law: str | Callable[..., float]) -> Law:
     entry = _named(kind, law) if isinstance(law, str) else _user_defined(kind, law)
     if not _can_be_called(kind, entry):
         loop = "pair loop" if kind in OF_THE_PAIR_LOOP else "coupling"
-        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the {loop} can call", arguments_of(kind))
+        taken = ", ".join(inspect.signature(entry.function).parameters)
+        remedy = f"it takes {taken}; {arguments_of(kind)}"
+        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the {loop} can call", remedy)
     return entry
 
 
@@ -59,11 +65,15 @@ def drag_by_name(law: Law, diameter_ratio: float = 1.0) -> Callable[[float, floa
     def factor(reynolds: float, voidage: float) -> float:
         try:
             value = called_by_name(law.function, DRAG_ARGUMENTS, (reynolds, voidage, diameter_ratio))
-        except (ArithmeticError, ValueError, TypeError) as failure:
+        except Exception as failure:  # whatever a user's function raises
             if is_built_in(law.function):
                 raise
             raise _not_finite(law, f"it fails ({failure})", reynolds, voidage) from None
-        if math.isfinite(reynolds) and not math.isfinite(value) and not is_built_in(law.function):
+        if is_built_in(law.function):
+            return value
+        if not isinstance(value, Real):
+            raise _not_finite(law, f"it returns {value!r}, which is no number,", reynolds, voidage)
+        if math.isfinite(reynolds) and not math.isfinite(value):
             raise _not_finite(law, f"it is {value:g}", reynolds, voidage)
         return value
 
@@ -82,6 +92,9 @@ def _named(kind: str, name: str) -> Law:
     if name not in laws:
         choices = [*BUILT_IN[kind], *(law.name for law in laws.values() if _can_be_called(kind, law))]
         remedy = "cfddem explain lists all laws; name the file of one of your own with --laws FILE.py"
+        if imported_laws():
+            files = ", ".join(file.name for file in imported_laws())
+            remedy = f'in {files}, put @closures.law("{kind}", source) before the function of this name'
         lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
         remedy = "; ".join([remedy, *lost])
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(choices)), remedy)
@@ -93,3 +106,40 @@ def _user_defined(kind: str, function: Callable[..., float]) -> Law:
         return law_of(function)
     except KeyError as failure:
         raise InputError(f"laws.{kind}", None, "a law", str(failure.args[0])) from None
+
+
+# ---------------------------------------------------------------- a file of laws
+#
+# A file of the user that declares laws: executed where a command names it, and nowhere else.
+
+_IMPORTED: dict[str, Path] = {}
+"""Files of laws that have been executed, by the names of their modules."""
+
+
+def imported_laws() -> list[Path]:
+    """Files of laws that have been executed, in order; processes that make runs for this one execute them, too."""
+    return [file for name, file in _IMPORTED.items() if name in sys.modules]
+
+
+def import_laws(file: Path) -> None:
+    """Execute a Python file, so that its laws are known; once in a process.
+
+    errors  InputError if it is no Python file, or fails
+    """
+    if file.suffix != ".py" or not file.stem.isidentifier() or not file.is_file():
+        raise InputError("--laws", str(file), "an existing Python file, such as my_laws.py")
+    loaded = sys.modules.get(file.stem)
+    if loaded is not None and getattr(loaded, "__file__", None) == str(file.resolve()):
+        return
+    if loaded is not None or file.stem in sys.stdlib_module_names:
+        raise InputError("--laws", str(file), "a file with a name of its own", "another module has its name; rename it")
+    spec = spec_from_file_location(file.stem, file.resolve())
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[file.stem] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as failure:
+        del sys.modules[file.stem]
+        limit = "a file that can be executed"
+        raise InputError("--laws", str(file), limit, f"{type(failure).__name__}: {failure}") from failure
+    _IMPORTED[file.stem] = file.resolve()

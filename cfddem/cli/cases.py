@@ -7,15 +7,15 @@ import shlex
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from cfddem.backend.brick_shapes import parsed
 from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
+from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import with_colour
@@ -36,7 +36,7 @@ DIVISION = "ranks along x, y and z, such as 2x2x1; default: the shape with the l
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
-LAWS = "Python file with your laws, which is executed; nothing in a case or run folder ever is; may be repeated"
+LAWS = "Python file with your laws, to be executed, as no file of a case or run folder is; may be repeated"
 
 
 @Parameter(name="*")
@@ -61,14 +61,23 @@ class Changes:
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None
     laws: Annotated[list[Path] | None, Parameter(help=LAWS, negative="")] = None
 
-    def case(self, path: Path) -> Case:
-        """The case of a file with its values replaced, after the user's laws are known."""
-        from cfddem.case.gallery import overrides
-        from cfddem.case.schema import Case
-
+    def import_laws(self) -> None:
+        """Make the user's laws known."""
         for file in self.laws or []:
             import_laws(file)
-        return Case.from_toml(path, overrides(self.set or []))
+
+    def values(self) -> dict[str, Any]:
+        """Values by key, after the user's laws are known."""
+        from cfddem.case.gallery import overrides
+
+        self.import_laws()
+        return overrides(self.set or [])
+
+    def case(self, path: Path) -> Case:
+        """The case of a file with its values replaced."""
+        from cfddem.case.schema import Case
+
+        return Case.from_toml(path, self.values())
 
 
 AS_IT_IS = Changes()
@@ -115,8 +124,7 @@ def check(
     picture: Annotated[Path | None, Parameter(help="PNG file for a drawing of the case, seen along y")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
-    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run, and only
-    the picture is written.
+    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run.
 
     Exit code: 0 without errors, 2 with errors.
 
@@ -329,31 +337,3 @@ def resume(
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
         _print_report(folder, json)
-
-
-# ---------------------------------------------------------------- a file of laws
-#
-# A file of the user that declares laws: executed where a command names it, and nowhere else.
-
-
-def import_laws(file: Path) -> None:
-    """Execute a Python file, so that its laws are known.
-
-    errors  InputError if it is no Python file, or fails
-    """
-    if file.suffix != ".py" or not file.stem.isidentifier() or not file.is_file():
-        raise InputError("--laws", str(file), "an existing Python file, such as my_laws.py")
-    loaded = sys.modules.get(file.stem)
-    if loaded is not None and getattr(loaded, "__file__", None) == str(file.resolve()):
-        return
-    if loaded is not None or file.stem in sys.stdlib_module_names:
-        raise InputError("--laws", str(file), "a file with a name of its own", "another module has its name; rename it")
-    spec = spec_from_file_location(file.stem, file.resolve())
-    assert spec is not None and spec.loader is not None
-    module = sys.modules[file.stem] = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as failure:
-        del sys.modules[file.stem]
-        limit = "a file that can be executed"
-        raise InputError("--laws", str(file), limit, f"{type(failure).__name__}: {failure}") from failure

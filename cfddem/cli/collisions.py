@@ -11,8 +11,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
 from cfddem.case.materials import Material
+from cfddem.cli.cases import LAWS
 from cfddem.cli.explain_pages import descriptions
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation, show
@@ -94,10 +96,8 @@ def _simple(annotation: Any) -> Any:
 
 
 def _option(name: str, kind: Any, default: Any, text: str) -> inspect.Parameter:
-    parameter = Parameter(help=text, negative="") if kind is bool else Parameter(help=text)
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, parameter]
-    )
+    option = Annotated[kind, Parameter(help=text, negative="")]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=option)
 
 
 def _collide(
@@ -109,9 +109,12 @@ def _collide(
     data: Path | None,
     figure: Path,
     csv: Path | None,
+    laws: list[Path] | None,
     **arguments: Any,
 ) -> immersed_pair.Collision | CollisionRange | MeasuredCollisions:
     """Collide two spheres of named materials: once, over a range of Stokes numbers, or at each measured point."""
+    for file in laws or []:
+        import_laws(file)
     materials, spin = immersed_pair.MATERIALS, arguments.pop("spin")
     own, other = arguments.pop("diameter"), arguments.pop("target_diameter")
     diameters = own, own if other is None else other
@@ -172,6 +175,7 @@ collide = command(
         "roughness": (float | None, None, "of both; that of the material if not given [m]"),
         "stokes": (str | None, None, "of the normal approach: a number, LOW..HIGH, or numbers with commas [-]"),
         "csv": (Path | None, None, "CSV file with one row for each collision"),
+        "laws": (list[Path] | None, None, LAWS),
         "spin": (float, 0.0, "of the striker before the collision [rad/s]"),
         "data": (Path | None, None, "CSV file of measured points, restitution over stokes or rebound angle over angle"),
         "figure": (Path, Path("collide.png"), "PNG file that shows the measured points"),

@@ -19,15 +19,20 @@ from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
+from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
+from cfddem.cli.cases import LAWS
 from cfddem.cli.json_output import json_schema, print_json
 from cfddem.cli.printing import announce_compilation
+
+SCHEMA = "case, or an output by the middle of its value `schema`: report, check, sweep, error, and others"
 
 
 def explain(
     law: Annotated[str | None, Parameter(help="a law, kind, key, table of a case, or word; default: all laws")] = None,
     *,
     plot: Annotated[Path | None, Parameter(help="PNG file for a plot of the law")] = None,
+    laws: Annotated[list[Path] | None, Parameter(help=LAWS, negative="")] = None,
     json: Annotated[bool, Parameter(help="print the documentation as JSON", negative="")] = False,
 ) -> None:
     """Show the documentation of a law: equation, arguments, range, reference. Or list laws: all, or those with a word.
@@ -39,6 +44,8 @@ def explain(
     from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
+    for file in laws or []:
+        import_laws(file)
     by_kind, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
     if law is not None and not pages.is_law(law):
         by_kind, keys = by_kind or pages.containing(law), pages.matching(law)
@@ -62,7 +69,7 @@ def explain(
 
 
 def schema(
-    name: Annotated[str, Parameter(help="case, or the name in the middle of the word `schema` of an output")] = "case",
+    name: Annotated[str, Parameter(help=SCHEMA)] = "case",
 ) -> None:
     """Print the JSON schema of case files, or of what a command prints with --json.
 

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.tables import line_width
-from cfddem.cli.cases import CASE, JSON, SET, print_warnings
+from cfddem.cli.cases import AS_IT_IS, CASE, JSON, Changes, print_warnings
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
 
@@ -57,7 +57,7 @@ def sweep(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
     values: Values = NO_VALUES,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    changes: Changes = AS_IT_IS,
     workers: Workers = HERE,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
@@ -73,13 +73,14 @@ def sweep(
 
     Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
     """
-    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.gallery import find_case
     from cfddem.studies import sensitivity as of_keys
     from cfddem.studies.samples import chosen_values
     from cfddem.studies.sweep import Outcome, failures
     from cfddem.studies.sweep import sweep as run_all
 
     path, over, vary = find_case(case), values.over or [], values.vary or []
+    shared = changes.values()
     kind = values.sensitivity
     asked = None if kind is None else of_keys.asked(kind, over, vary, values.runs)
     chosen = chosen_values(over, vary, values.sample, values.runs) if asked is None else asked.runs
@@ -87,7 +88,7 @@ def sweep(
     if workers.write_jobs:
         from cfddem.studies.sweep import write_jobs as write
 
-        lines, script, count = write(path, chosen, folder, overrides(set or []))
+        lines, script, count = write(path, chosen, folder, shared)
         if json:
             print_json("written", {"files": [lines, script]})
         else:
@@ -104,7 +105,7 @@ def sweep(
     if workers.jobs == 1 and workers.scheduler is None and not json:
         announce_compilation()
     outcomes = run_all(
-        path, chosen, folder, overrides=overrides(set or []), jobs=workers.jobs, scheduler=workers.scheduler,
+        path, chosen, folder, overrides=shared, jobs=workers.jobs, scheduler=workers.scheduler,
         progress=progress,
     )  # fmt: skip
     failed = list(failures(outcomes))
@@ -151,21 +152,21 @@ def calibrate(
     ] = None,
     collide: Annotated[str | None, Parameter(help=COLLIDE)] = None,
     effort: Effort = USUAL,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    changes: Changes = AS_IT_IS,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-calibration")] = None,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
     """Find values of a case for which it agrees with measured data, with errors; say which the data do not identify.
 
-    After a stop, the same command continues. Trials that fail are recorded, and the search goes on.
-    Exit code: 3 if every trial fails.
+    The data need a column of errors. After a stop, the same command continues. Trials that fail are recorded, and the
+    search goes on. Exit code: 3 if every trial fails. Runs of a case need: pip install 'cfddem[calibrate]'
 
-    With --collide the data are collisions of two spheres or a sphere and a wall; keys are values of the material and
-    options of the command collide. The data need a column of errors. See the page "Calibration".
+    With --collide the data are collisions of two spheres or a sphere and a wall; keys of --vary and --set are values
+    of the material and options of the command collide. All collisions are computed by each call.
 
     Example: cfddem calibrate box.toml --match measured.csv --vary material.glass.restitution=0.6..1
     """
-    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.gallery import find_case
     from cfddem.case.schema import Case
     from cfddem.preflight.summary import preflight
     from cfddem.studies.calibration import calibrate as search
@@ -184,19 +185,20 @@ def calibrate(
         if case is not None or effort.jobs != 1:
             raise InputError("--collide", collide, "used without a case and without --jobs")
         folder = output or Path("collide-calibration")
-        of_collisions = _of_collisions(collide, match or (), vary, set or (), effort.trials, progress)
+        changes.import_laws()
+        of_collisions = _of_collisions(collide, match or (), vary, changes.set or (), effort.trials, progress)
         make_output(folder)
         write_results(of_collisions, folder)
         _print(of_collisions, folder, json)
         return
     path = find_case(case)
-    print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
+    shared = changes.values()
+    print_warnings(preflight(Case.from_toml(path, shared)))
     folder = output or Path(f"{path.stem}-calibration")
 
     of_runs = search(
         path, match or (), variables(vary), folder, trials=effort.trials, jobs=effort.jobs,
-        overrides=overrides(set or []),
-        progress=progress,
+        overrides=shared, progress=progress,
     )  # fmt: skip
     _print(of_runs, folder, json)
 

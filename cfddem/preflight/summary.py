@@ -22,10 +22,10 @@ from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
-from cfddem.preflight.collision_estimate import estimate_collision
+from cfddem.preflight.collision_estimate import estimate_collision, pair_row, reduced
 from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import fits
-from cfddem.preflight.issue import ORDER, Issue
+from cfddem.preflight.issue import ORDER, Issue, Severity
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
@@ -214,7 +214,7 @@ def refuse_errors(case: Case) -> Preflight:
 # ---------------------------------------------------------------- laws of a user
 
 
-FATAL = ("fails", "cannot be compiled", "takes", "does not take", "is nan", "is inf", "is -inf", "is not")
+FATAL = ("fails", "cannot be compiled", "takes", "does not take", "returns", "is nan", "is inf", "is -inf", "is not")
 """How problems begin with which a law cannot be used in a run."""
 
 
@@ -225,6 +225,13 @@ def check_own_laws(case: Case) -> Iterator[Issue]:
             fatal = problem.startswith(FATAL) or "must be positive" in problem
             remedy = "correct it, or state the range for which it holds" if fatal else "see closures.check"
             yield Issue("error" if fatal else "warning", f"laws.{kind}", f"{law.name} {problem}", remedy)
+    contact = case.laws.contact_law
+    if not contact.force.__module__.startswith("cfddem."):
+        species = next(iter(case.species.values()))
+        mass, radius = reduced(case, species, species.diameter)
+        for problem in contact.problems(mass, radius, pair_row(case, species)):
+            severity: Severity = "warning" if "but force rises" in problem else "error"
+            yield Issue(severity, "laws.contact", f"{contact.name}: {problem}", "correct the functions of the law")
     for name, reason in registry.load_package_laws().items():
         yield Issue("warning", "laws", f"the package {name} could not be loaded: {reason}", "correct or remove it")
 

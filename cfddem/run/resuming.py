@@ -203,9 +203,10 @@ def warn_of_changes(folder: RunFolder, case: Case) -> None:
     """Warn, in one line for each, of laws whose source has changed since the run was written; record the new ones."""
     about = folder.about["provenance"]
     before, now = about.get(RECORD, {}), record_of(case).get(RECORD, {})
+    changed = changed_laws(about, case)
     for kind in before.keys() & now.keys():
         old = str(before[kind]["fingerprint"])
-        if old.rpartition(THEN)[2] == now[kind]["fingerprint"]:
+        if kind not in changed:
             now[kind] = before[kind]
             continue
         warnings.warn(
@@ -216,6 +217,13 @@ def warn_of_changes(folder: RunFolder, case: Case) -> None:
         now[kind]["fingerprint"] = f"{old}{THEN}{now[kind]['fingerprint']}"
     if now != before:
         folder.note("provenance", {**about, RECORD: now})
+
+
+def changed_laws(provenance: Mapping[str, Any], case: Case) -> list[str]:
+    """Kinds of laws of a case whose source differs from that with which a run was written, by its provenance."""
+    before, now = provenance.get(RECORD, {}), record_of(case).get(RECORD, {})
+    marks = {kind: str(before[kind]["fingerprint"]).rpartition(THEN)[2] for kind in before.keys() & now.keys()}
+    return sorted(kind for kind, mark in marks.items() if mark != now[kind]["fingerprint"])
 
 
 def _described(name: str, function: Callable[..., float]) -> Mapping[str, str]:

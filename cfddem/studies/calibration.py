@@ -272,7 +272,7 @@ def _study(output: Path, fingerprint: str) -> Any:
     study = optuna.create_study(storage=storage, study_name=STUDY, load_if_exists=True, sampler=sampler)
     earlier = study.user_attrs.get("fingerprint")
     if earlier not in (None, fingerprint):
-        limit = "a folder of the same case, data and ranges"
+        limit = "a folder of the same case, laws, data and ranges"
         raise InputError("output", str(output), limit, "choose another folder with -o")
     study.set_user_attr("fingerprint", fingerprint)
     for trial in study.get_trials(deepcopy=False):
@@ -291,14 +291,16 @@ def _trial(frozen: Any) -> Trial:
 
 
 def _fingerprint(case: Case, varied: Sequence[Variable], data: Sequence[Points]) -> str:
-    """A number that changes with case, ranges or data."""
+    """A number that changes with case, ranges, data, or the source of the user's laws."""
+    from cfddem.run.resuming import record_of
+
     plain = case.model_copy(update={"compare": {}})
     points = [
         [points.name, points.quantity, points.against, points.weight]
         + [column.tolist() for column in (points.place, points.value, points.error)]
         for points in data
     ]
-    text = json.dumps([plain.to_toml(), [list(variable) for variable in varied], points])
+    text = json.dumps([plain.to_toml(), [list(variable) for variable in varied], points, record_of(case)])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfddem.backend.errors import CfddemError, InputError, RunStopped, library
 from cfddem.backend.launch import safe_workers
+from cfddem.backend.law_choice import import_laws, imported_laws
 from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
 from cfddem.case.input_errors import field_of
@@ -178,7 +179,8 @@ def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
     from joblib import Parallel, delayed
 
     with safe_workers():
-        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*job) for job in work)
+        laws = imported_laws()
+        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*job, laws) for job in work)
 
 
 def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
@@ -194,7 +196,8 @@ def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
             "--scheduler", scheduler, "the address of a dask scheduler that answers", str(failure)
         ) from None
     with client:
-        futures = [client.submit(_one, *job[:3], True, pure=False, retries=1) for job in work]
+        laws = imported_laws()
+        futures = [client.submit(_one, *job[:3], True, laws, pure=False, retries=1) for job in work]
         for done in as_completed(futures):
             yield done.result()
 
@@ -226,14 +229,20 @@ def _sets(over: Over) -> Iterator[dict[str, Any]]:
         yield from map(dict, over)
 
 
-def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> Outcome:
-    """Run or resume one run, or keep it if it is finished; any failure becomes part of the outcome."""
+def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool, laws: Sequence[Path] = ()) -> Outcome:
+    """Run or resume one run, or keep it if it is finished; any failure becomes part of the outcome.
+
+    laws  files of the user's laws, for a process that does not know them
+    """
     from cfddem.backend.compile import use_threads
     from cfddem.io.reading import open_run
+    from cfddem.run.resuming import changed_laws
     from cfddem.run.runner import Run
 
     begun, kept = time.monotonic(), False
     try:
+        for file in laws:
+            import_laws(file)
         if one_thread:
             use_threads(1)
         checked = preflight(case)
@@ -247,6 +256,9 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
             same = _without_data(before.case_text) == _without_data(text_with_kept_files(case))
             if not same or not holds_surfaces_of(case, folder):
                 raise InputError("output", str(folder), "a folder of the same case", "choose another folder")
+            if changed := changed_laws(before.provenance, case):
+                limit = f"a folder of runs with the same laws; the source of laws.{changed[0]} has changed"
+                raise InputError("output", str(folder), limit, "choose another folder")
             kept = before.status == "finished"
             if not kept:
                 Run.resume(folder).go()
@@ -364,6 +376,8 @@ def write_jobs(
         words = [str(program), "run", str(Path(path).absolute()), "-o", str(output / name), "--continue"]
         for key, value in {**shared, **values}.items():
             words += ["--set", f"{key}={_text(value)}"]
+        for file in imported_laws():
+            words += ["--laws", str(file)]
         lines.append(shlex.join(words))
     jobs, script = output / "jobs.txt", output / "jobs.slurm"
     jobs.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -20,10 +20,11 @@ from made_up_run import BED, made_up
 from cfddem.analysis.comparison import compare, lines
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
+from cfddem.backend.law_choice import import_laws
 from cfddem.case.schema import Case
-from cfddem.cli.cases import import_laws
 from cfddem.coupling.forces.drag import Drag
 from cfddem.io.reading import open_run
+from cfddem.particles.interactions.laws import Laws
 from cfddem.plotting.report_page import page
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.law_ranges import effect_of_drag
@@ -316,3 +317,107 @@ def test_resume_says_how_a_changed_case_is_run(tmp_path: Path) -> None:
     assert done.code == 2 and len(done.err.splitlines()) == 1
     assert f"cfddem run --from {folder} --set fluid.viscosity=2e-3 -o NEW" in done.err
     assert "--set" not in call("resume", "--help").out
+
+
+def test_sweeps_import_laws_of_a_file_also_in_other_processes(
+    stopped: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two runs at a time; a repeated sweep keeps them, and refuses them where the source of the law has changed."""
+    folder, file = stopped
+    monkeypatch.chdir(folder.parent)
+    words = ("sweep", "bed/case.toml", "--over", "seed=1,2", "--laws", file.name, "-o", "seeds", "--jobs", "2")
+    assert call(*words[:4]).code == 2
+    done = call(*words)
+    assert done.code == 0, done.err
+    assert "already finished" in call(*words).out
+    about = Path("seeds/seed-1/run.json")
+    about.write_text(about.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
+    done = call(*words)
+    assert done.code == 3 and "the source of laws.drag has changed" in done.err and done.err.count("\n") == 1
+
+
+def test_commands_of_a_job_array_name_the_files_of_laws(
+    stopped: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, file = stopped
+    monkeypatch.chdir(folder.parent)
+    done = call("sweep", "bed/case.toml", "--over", "seed=1,2", "--laws", file.name, "-o", "seeds", "--write-jobs")
+    assert done.code == 0, done.err
+    assert all(f"--laws {file.resolve()}" in line for line in Path("seeds/jobs.txt").read_text().splitlines())
+
+
+def test_explain_shows_a_law_of_a_file(stopped: tuple[Path, Path]) -> None:
+    assert call("explain", "of_a_file").code == 2
+    done = call("explain", "of_a_file", "--laws", str(stopped[1]))
+    assert done.code == 0 and "a test" in done.out and "reynolds" in done.out
+
+
+@pytest.mark.parametrize(
+    "text, name, said",
+    [
+        ("    return 1.0 if reynolds > 1e9 else None", "odd", "returns None, which is no number"),
+        ("    return str(reynolds)", "odd", "which is no number"),
+        ("    return [1.0][int(reynolds) + 1]", "odd", "odd fails (list index out of range)"),
+        ("    return 1.0", "not_there", 'put @closures.law("drag", source) before the function of this name'),
+    ],
+)
+def test_a_wrong_function_of_a_file_is_refused_in_a_line(
+    text: str, name: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry.load_built_in_laws()
+    monkeypatch.setitem(REGISTRY, "drag", dict(REGISTRY["drag"]))
+    head = 'import closures\n\n@closures.law("drag", "a test")\ndef odd(reynolds, voidage):\n'
+    (file := tmp_path / "odd_laws_of_a_test.py").write_text(f"{head}{text}\n")
+    try:
+        done = call("check", "liquid-bed", "--laws", str(file), "--set", f"laws.drag={name}")
+    finally:
+        sys.modules.pop(file.stem, None)
+    assert done.code == 2 and said in " ".join(f"{done.out} {done.err}".split()), done
+
+
+FILM = """
+import math
+
+import closures
+
+
+@closures.law("lubrication", "a test")
+def film_of_a_file(gap: float, viscosity: float, reduced_radius: float) -> float:
+    return 6.0 * math.pi * viscosity * reduced_radius**2 / gap
+"""
+
+
+def test_collisions_take_a_film_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`collide` and `calibrate --collide` give the function of the law that is named to the collision."""
+    from scenarios.collisions.immersed_pair import calibration, collide, study
+
+    registry.load_built_in_laws()
+    monkeypatch.setitem(REGISTRY, "lubrication", dict(REGISTRY["lubrication"]))
+    monkeypatch.chdir(tmp_path)
+    Path("film_of_a_test.py").write_text(FILM)
+    Path("points.csv").write_text("stokes [-], restitution [-], error [-]\n30, 0.4, 0.1\n")
+    taken = []
+
+    class Asked(study.Impact):
+        def laws(self, viscosity: float) -> Laws:
+            taken.append(self.lubrication)
+            raise InputError("here", None, "the end of the test")
+
+    ended = study.takes(Asked)(collide.__wrapped__)
+    monkeypatch.setattr(calibration, "collide", ended)
+    monkeypatch.setattr("scenarios.collisions.immersed_pair.collide", ended)
+    laws = ("--laws", "film_of_a_test.py")
+    film = ("--velocity", "0.1", "--stokes", "30", "--lubrication")
+    fit = ("calibrate", "--collide", "glass", "--match", "points.csv", "--vary", "roughness=1e-8..1e-7",
+           "--set", "velocity=0.1", "--set", "lubrication=film_of_a_file")  # fmt: skip
+    try:
+        assert "--laws FILE.py" in call("collide", *film, "film_of_a_file").err
+        assert "--laws FILE.py" in call(*fit).err
+        for words in (("collide", *film, "film_of_a_file", *laws), (*fit, *laws)):
+            assert "the end of the test" in call(*words).err
+        assert [law.__name__ for law in taken] == ["film_of_a_file"] * len(taken) and len(taken) >= 2
+        taken.clear()
+        assert "the end of the test" in call("collide", *film, "nijssen").err and taken == [None]
+        assert "film_motions" in call("collide", *film, "nijssen_full").err
+    finally:
+        sys.modules.pop("film_of_a_test", None)

@@ -51,6 +51,19 @@ def test_rates_of_a_bed_whose_surface_limits_give_its_water_later() -> None:
         assert by_air >= by_surface
 
 
+@pytest.mark.parametrize("water, grows", [(1e-7, True), (1e-4, False)])
+def test_the_water_of_a_bed_lies_between_both_answers(water: float, grows: bool) -> None:
+    """A bed whose evaporation saturates, E = E_air W/(W + W_half), integrated in small steps."""
+    most, half, spray = 4e-6, 1e-6, 2e-6
+    found = DryingRates(0.0, 1.0, water, water, most * water / (water + half), spray, math.nan, 300.0, 0.0, 0.0)
+    for later in (0.1, 1.0, 5.0):
+        true, step = water, 1e-3
+        for _ in range(round(later / step)):
+            true += step * (spray - most * true / (true + half))
+        by_surface, by_air = found.water_after(later)
+        assert (by_surface < true < by_air) if grows else (by_air < true < by_surface)
+
+
 def test_a_window_that_is_not_steady_is_seen_by_its_drift() -> None:
     assert rates(1.0, 0.0).drift > 0.1 and abs(rates(30.0, 20.0).drift) < 1e-3
     steady = rates(30.0, 20.0)

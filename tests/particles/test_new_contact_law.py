@@ -242,3 +242,33 @@ def test_memory_may_begin_at_a_number_that_is_not_finite(initial: float) -> None
 def test_memory_that_loops_cannot_keep_is_refused(field: Field, said: str) -> None:
     with pytest.raises(InputError, match=said):
         Laws(contact=replace(LAW, memory=(field,))).check()
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        (
+            {"force": lambda overlap: math.log(overlap - 1.0)},
+            r"force fails \(",
+        ),
+        ({"force": lambda overlap: math.nan}, "force is nan at an overlap of 0.0001 % of a diameter"),
+        ({"force": lambda overlap: None}, "force fails"),
+        ({"damping": lambda overlap: -1.0}, "damping not negative"),
+        ({"stiffness": lambda overlap: 0.0}, "stiffness must be positive"),
+        ({"stiffness": lambda loading_stiffness: 0.1 * loading_stiffness}, "but force rises by 400 N/m"),
+        ({"force": lambda overlap, temperature: overlap}, "temperature.*declare another one in `parameters`"),
+    ],
+)
+def test_a_check_names_what_is_wrong_with_a_contact_law(changes: dict[str, Any], said: str) -> None:
+    """The key is that of the law, and only a stiffness below the slope of the force is no error."""
+    name = register(replace(LAW, name="wrong", secant_stiffness=None, **changes)).name
+    case = Case(
+        material={"glass": GLASS}, column={"width": 0.006, "height": 0.02, "cell": 0.002},
+        bed={"diameter": 1e-3, "count": 40, "start": "suspended"}, run={"until": 0.002},
+        laws={"contact": name, "contact_parameters": {"loading_stiffness": 400.0, "unloading_stiffness": 500.0}},
+    )  # fmt: skip
+    found = [issue for issue in preflight(case).issues if issue.key == "laws.contact"]
+    assert len(found) == 1 and re.search(said, found[0].reason), found
+    assert (found[0].severity == "warning") == ("but force" in said)
+    right = case.with_(**{"laws.contact": LAW.name})
+    assert not [issue for issue in preflight(right).issues if issue.key == "laws.contact"]

@@ -39,6 +39,12 @@ COLUMNS: tuple[str, ...] = PAIR.names or ()
 
 Function = Callable[..., float]
 
+_OTHERS = ("remember", "impact")
+"""Functions of a law that do not give one number."""
+
+_SHARES_OF_DIAMETER = (1e-6, 1e-4, 1e-3, 1e-2, 2e-2)
+"""Overlaps at which a law is checked."""
+
 FARTHEST = 1e4
 """Overlap over R* up to which the largest overlap of an impact is sought."""
 
@@ -165,6 +171,42 @@ class ContactLaw:
         """Overlap under a load [N] in [m]; infinite if the law does not carry it."""
         return _first(lambda overlap: self.evaluate(self.force, overlap, mass, radius, row) >= load, radius)
 
+    def problems(self, mass: float, radius: float, row: Any) -> Iterator[str]:
+        """What is wrong with the functions of the law at overlaps from 1e-6 to 2 % of a diameter, in words.
+
+        Each function must give a finite number, the stiffness be positive, and the damping not negative. A stiffness
+        that is less than half of the slope of the force lets the time step be too long.
+        """
+        numbers = {
+            name: function for name, function in vars(self).items() if callable(function) and name not in _OTHERS
+        }
+        for share in _SHARES_OF_DIAMETER:
+            overlap, at = share * 4.0 * radius, f"at an overlap of {100.0 * share:g} % of a diameter"
+            values = {}
+            for name, function in numbers.items():
+                try:
+                    values[name] = self.evaluate(function, overlap, mass, radius, row)
+                except InputError as failure:
+                    yield str(failure)
+                    return
+                except Exception as failure:  # whatever a user's function raises
+                    yield f"{name} fails ({failure}) {at}"
+                    return
+                if not math.isfinite(values[name]):
+                    yield f"{name} is {values[name]} {at}"
+                    return
+            stiffness, damping = values["stiffness"], values["damping"]
+            if stiffness <= 0.0 or damping < 0.0:
+                limit = "stiffness must be positive, and damping not negative"
+                yield f"stiffness is {stiffness:.3g} N/m and damping {damping:.3g} kg/s {at}: {limit}"
+                return
+            less, more = (self.evaluate(self.force, side * overlap, mass, radius, row) for side in (0.999, 1.001))
+            slope = (more - less) / (0.002 * overlap)
+            if stiffness < 0.5 * slope:
+                effect = "the time step follows from stiffness"
+                yield f"stiffness is {stiffness:.3g} N/m, but force rises by {slope:.3g} N/m {at}; {effect}"
+                return
+
     def _known(self, mass: float, radius: float, row: Any) -> dict[str, Any]:
         """Arguments that do not change during an impact."""
         columns = {name: float(row[name]) for name in COLUMNS}
@@ -175,7 +217,8 @@ def _asked(function: Callable[..., Any], values: Mapping[str, Any]) -> Any:
     """Value of a function that takes some of the known values by name."""
     taken = _arguments(function)
     if unknown := [name for name in taken if name not in values]:
-        raise InputError(f"argument of {function.__name__}", unknown[0], f"one of {', '.join(values)}")
+        remedy = "declare another one in `parameters`, `memory` or `derived` of the law"
+        raise InputError(f"argument of {function.__name__}", unknown[0], f"one of {', '.join(values)}", remedy)
     return function(**{name: values[name] for name in taken})
 
 

@@ -31,7 +31,7 @@ KEYS = [*Material.model_fields, *(name for name in inspect.signature(collide).pa
 def key_of(word: str) -> str:
     """The name of a value of a collision; InputError for another word."""
     name = word.replace("-", "_")
-    if name not in KEYS or name in ("stokes", "minimum_gap", "lubrication"):
+    if name not in KEYS or name == "stokes":
         raise InputError("key", word, nearest(name, KEYS), "stokes or angle come from the data" * (name == "stokes"))
     return name
 

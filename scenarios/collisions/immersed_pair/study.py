@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from cfddem.backend.errors import InputError, UnstableStep
 from cfddem.backend.html import table
@@ -31,7 +31,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
-from closures.kinds import GAP_ARGUMENTS
+from closures.kinds import BUILT_IN, GAP_ARGUMENTS
 from closures.minimum_gap import elastohydrodynamic
 from scenarios.collisions.immersed_pair.motion import Setting, chosen_forces, fluid_around, integrate, stage
 
@@ -40,6 +40,9 @@ SLOWEST, FASTEST = 1e-12, 1e3
 
 ROUGH = 0.05
 """Largest roughness over the smaller diameter, as of cases [-]."""
+
+BUILT_IN_LAWS = {"minimum_gap": ("elastohydrodynamic",), "lubrication": ("nijssen", "auto")}
+"""Names of the laws of a collision without a user's law."""
 
 MATERIALS = {
     "steel_smooth": Material(
@@ -136,15 +139,27 @@ class Impact(Settings):
         None, gt=0,
         description="follow the pair for this time, also after it has left the film, or until it rests [s]",
     )  # fmt: skip
-    minimum_gap: Callable[..., float] | None = Field(
-        None, description="a user-defined law for h_min, instead of the elastohydrodynamic one"
+    minimum_gap: str | Callable[..., float] | None = Field(
+        None, description="a user-defined law for h_min, or its name; default: elastohydrodynamic"
     )
-    lubrication: Callable[..., float] | None = Field(
-        None, description="a user-defined law for the resistance of the film"
+    lubrication: str | Callable[..., float] | None = Field(
+        None, description="a user-defined law for the resistance of the film, or its name; default: nijssen"
     )
     film_motions: str = Field(
         "normal", description='that films resist: "normal"; "full" with sliding and rolling; "full_twist"'
     )
+
+    @field_validator("minimum_gap", "lubrication")
+    @classmethod
+    def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
+        """The function of a law; None for the default one, and for none given."""
+        kind = about.field_name or ""
+        if value is None or value in BUILT_IN_LAWS[kind]:
+            return None
+        if value in BUILT_IN[kind]:
+            remedy = 'film_motions = "full" resists sliding; with a viscosity of 0 there is no film'
+            raise InputError(kind, value, f"{BUILT_IN_LAWS[kind][0]} or a user-defined law", remedy)
+        return chosen(kind, value).function
 
     @property
     def step(self) -> float:
@@ -159,8 +174,8 @@ class Impact(Settings):
             integrator=self.integrator,
             friction_onset=self.friction_onset,
             spring=self.spring,
-            minimum_gap=self.minimum_gap,
-            lubrication=self.lubrication,
+            minimum_gap=self.minimum_gap,  # type: ignore[arg-type]  # a function by now
+            lubrication=self.lubrication,  # type: ignore[arg-type]
             film_motions=self.film_motions if viscosity > 0.0 else "normal",
         )
 
