@@ -79,10 +79,6 @@ class Case(CaseTables):
             self.vessel.refuse(self.column)
         if not self.has_smooth_walls:
             return self
-        for name in ("heat", "vapour"):
-            if self.thin_walls and getattr(self, name, None) is not None:
-                remedy = 'give thin walls solid = "none", so that they are for particles only'
-                raise InputError(name, None, "left out beside thin walls", remedy)
         where = "in a vessel with a fluid" if self.vessel else "beside thin walls"
         if self.column.shape == "cylinder":
             raise InputError("column.shape", None, f"a box {where}", 'take [vessel] with shape = "cylinder"')

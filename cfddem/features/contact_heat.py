@@ -21,10 +21,12 @@ import numpy as np
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import serial
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import triangles
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
 from cfddem.features.heat import LEAST, mean_temperature
 from cfddem.features.heat_keys import Heat
+from cfddem.fluid.thin_walls import thin_wall
 from cfddem.model.fields import Field
 from cfddem.particles.pair_graph import shifts
 from cfddem.particles.particle_feature import Engine, ParticleFeature
@@ -253,6 +255,8 @@ class HeatExchangeOfContacts(CaseFeature):
         self.capacities = _capacities(case, keys)
         self.emissivities = keys.by_material(case, "emissivity", 0.0)
         self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
+        thin = [triangles(wall) for wall in case.wall if wall.is_thin]  # also without a fluid
+        self._thin = thin_wall(*thin) if thin else None
         self.from_walls, self.radiated, self.gained, self.scale = 0.0, 0.0, 0.0, 0.0
         self.total_capacity, self._step = float(simulation.communicator.sum(self.capacity(simulation.owned))), 0.0
         self.choices = Choices(
@@ -359,6 +363,10 @@ class HeatExchangeOfContacts(CaseFeature):
             particles, particles.material[first[:pairs]], particles.material[second[:pairs]],
             (particles.radius[first[:pairs]], particles.radius[second[:pairs]], gap[:pairs], force[:pairs]), solver,
         )  # fmt: skip
+        if self._thin:
+            near = np.flatnonzero(between)
+            begin = particles.position[first[near]]
+            between[near[self._thin.between(begin, begin - self._apart(solver)[near])]] = 0.0
         body, piece = first[pairs:], second[pairs:]
         wall = walls.wall[piece]
         # one link of a particle and a wall: at the nearest of its pieces
@@ -383,13 +391,17 @@ class HeatExchangeOfContacts(CaseFeature):
 
     def _normal_force(self, solver: Any) -> np.ndarray:
         """Normal force of every contact, repulsive above 0 (n,) [N]."""
-        edges, particles = solver.edges, solver.particles
-        pairs = edges.between_particles
-        apart = particles.position[edges.first[:pairs]] - particles.position[edges.second[:pairs]]
-        apart += shifts(solver.box)[edges.image[:pairs]]
+        edges, apart = solver.edges, self._apart(solver)
         apart /= np.maximum(np.linalg.norm(apart, axis=1), 1e-300)[:, None]
         normal = np.concatenate([apart, edges.touch[:, NORMAL : NORMAL + 3]])
         return np.asarray(np.einsum("ij,ij->i", edges.force, normal))
+
+    def _apart(self, solver: Any) -> np.ndarray:
+        """Place of the first particle of every pair from that of the second (n, 3) [m]."""
+        edges, position = solver.edges, solver.particles.position
+        pairs = edges.between_particles
+        apart = position[edges.first[:pairs]] - position[edges.second[:pairs]]
+        return np.asarray(apart + shifts(solver.box)[edges.image[:pairs]])
 
     def _conductances(
         self, particles: Particles, one: np.ndarray, other: np.ndarray, shape: tuple[np.ndarray, ...], solver: Any

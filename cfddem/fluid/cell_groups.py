@@ -104,9 +104,6 @@ class CutGroups(SingleCells):
     def __init__(self, fluid: FluidSolver) -> None:
         grid, cut = fluid.grid, fluid.boundaries.cut
         assert isinstance(cut, CutCells)
-        if isinstance(grid.walls, TwoSided):
-            remedy = "leave out divided(), so that they are for particles only"
-            raise InputError("thin walls", None, "left out beside a temperature or a vapour", remedy)
         if grid.whole is not grid:
             remedy = "take one process, or solid cells"
             raise InputError("ranks", None, "1 for a temperature or a vapour within smooth walls", remedy)

@@ -20,10 +20,6 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.build import boundaries_of, walls_of
 from cfddem.run.division import require_parallel
 
-HEAT = {
-    "particle_temperature": 400.0, "fluid_temperature": 300.0, "conductivity": 0.026, "fluid_heat_capacity": 1000.0,
-    "heat_capacity": {"glass": 800.0},
-}  # fmt: skip
 TUBE = {"shape": "cylinder", "point": [0.08, 0.08, 0.02], "radius": 0.026, "length": 0.08, "solid": "thin"}
 PLATE = {"shape": "plate", "point": [0.0, 0.083, 0.1], "edges": [[0.16, 0.0, 0.0], [0.0, 0.0, 0.05]]}
 
@@ -81,14 +77,13 @@ def test_a_cone_of_triangles_has_its_ends():
         ([{**PLATE, "radius": 0.1}], {}, 'radius = 0.1.*left out for shape = "plate"'),
         ([TUBE], {"vessel": None, "patch": {}, "column.shape": "cylinder"}, "column.shape.*a box beside thin walls"),
         ([TUBE, {**TUBE, "solid": "inside"}], {}, 'wall.1.solid.*"none" or "thin" in a vessel'),
-        ([TUBE], {"vessel": None, "patch": {}, "heat": HEAT}, "heat.*left out beside thin walls"),
         ([TUBE, SHEET], {"vessel": None, "column.sides": "periodic"}, r"wall.1.point.*0 and 0.16 m along x.*from 0.16"),
         ([{**SHEET, "point": [0.0, 0.02, 0.1]}], {"vessel": None, "column.sides": "periodic"}, "wall.0.point.*along x"),
         ([PLATE], {"vessel": None, "column.sides": "periodic"}, "wall.0.point.*along x; it reaches from 0 to 0.16 m"),
         ([{**TUBE, "length": 0.3}], {"vessel": None, "patch": {}, "column.ends": "periodic"}, "wall.0.point.*along z"),
     ],
-    ids=["unsaid", "caps", "moves", "spins", "inside", "parallel", "no edges", "radius", "round", "closed", "heat",
-         "at a side", "at the other side", "between sides", "through the lid"],
+    ids=["unsaid", "caps", "moves", "spins", "inside", "parallel", "no edges", "radius", "round", "closed", "at a side",
+         "at the other side", "between sides", "through the lid"],
 )  # fmt: skip
 def test_thin_walls_that_cannot_be_are_refused_in_a_line(walls, given, said):
     walls = [{key: value for key, value in wall.items() if value is not None} for wall in walls]

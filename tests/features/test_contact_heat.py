@@ -79,6 +79,21 @@ def test_contacts_across_a_periodic_side_conduct_as_any_other() -> None:
     assert warmed(0.043, column__sides="periodic") == pytest.approx(within, abs=1e-6)
 
 
+@pytest.mark.parametrize("gap", [-1.33e-7, 1e-4])
+def test_nothing_passes_between_spheres_on_both_sides_of_a_plate(gap: float) -> None:
+    """Through a contact or a gap of gas; beside the end of the plate they exchange heat as ever."""
+
+    def exchanged(height: float) -> float:
+        edges = [[0.0, 0.02, 0.0], [0.0, 0.0, height]]
+        plate = {"shape": "plate", "point": [0.005 + 1.5e-3 + 0.5 * gap, 0.0, 0.0], "edges": edges}
+        heat = {"gap": "lens", "gas_conductivity": GAS}
+        simulation = Simulation(two_spheres(gap, 1.0, 10.0, heat, wall=[plate]))
+        simulation.step()
+        return simulation.feature(HeatExchangeOfContacts).scale
+
+    assert exchanged(0.0108) == 0.0 and exchanged(0.0045) > 0.0
+
+
 def at_the_floor(wall: dict[str, Any], **heat: Any) -> Case:
     """One sphere on the floor, pressed by its weight, and one that touches nothing."""
     given = {"wall": {"floor": wall}, "gap": "lens", "gas_conductivity": GAS, **heat}

@@ -11,6 +11,9 @@ from example_case import GLASS
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.features.heat import HeatExchange
+from cfddem.features.vapour import Vapour
 from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Grid
@@ -18,6 +21,7 @@ from cfddem.fluid.scalar import Scalar, ScalarKind
 from cfddem.fluid.scalar_conditions import ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import Plane, cylinder, turned
+from cfddem.fluid.thin_walls import ASIDE, ThinWall, divided, thin_wall
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 
@@ -30,10 +34,10 @@ def scalar(fluid: FluidSolver, wall: Wall | None = None, start: float = 300.0, *
     return Scalar(fluid, ScalarKind("temperature", "K", "", start, **given), ScalarSides(start, walls=walls))
 
 
-def in_a_cone(conditions: dict[str, Any], voidage: float = 0.6) -> FluidSolver:
-    """Slivers, and cells that the wall leaves to a fifth, at every height."""
+def in_a_cone(conditions: dict[str, Any], voidage: Any = 0.6, thin: ThinWall | None = None) -> FluidSolver:
+    """Slivers, and cells that the wall leaves to a fifth, at every height; a thin wall may divide them."""
     cone = turned([(0.0, 0.015), (0.06, 0.041)], (0.0503, 0.0497, 0.0))
-    grid = within(Grid((10, 10, 6), (0.01,) * 3), cone)
+    grid = within(Grid((10, 10, 6), (0.01,) * 3), divided(thin, cone) if thin else cone)
     fluid = FluidSolver(grid, conditions, density=1.2, viscosity=1.8e-5, voidage=voidage)
     fluid.set_velocity((0.0, 0.0, 0.0))
     return fluid
@@ -168,6 +172,86 @@ def test_the_nusselt_number_of_a_pipe_with_a_wall_of_one_temperature(n: int, wit
     assert found == pytest.approx(exact, rel=within_)
 
 
+# ---------------------------------------------------------------- beside thin walls
+
+SHEET = np.array([[0.035, -1.0, -1.0], [0.071, 1.0, -1.0], [0.071, 1.0, 1.0], [0.035, -1.0, 1.0]])
+"""A baffle through all of the cone, beside its middle and not along the cells."""
+
+
+class Divided:
+    """The cone with a baffle, and particles on both sides that exchange heat with the cells around them."""
+
+    def __init__(self, conditions: dict[str, Any], of_sides: tuple[float, float], is_there: bool = True) -> None:
+        self.thin = thin_wall(SHEET[[[0, 1, 2], [0, 2, 3]]])
+        self.random, kind = np.random.default_rng(3), ScalarKind("temperature", "K", "", 300.0, RHO_C, CONDUCTIVITY)
+        self.position = self.random.uniform((0.03, 0.03, 0.004), (0.07, 0.07, 0.05), (300, 3))
+        self.radius, self.capacity = np.full(300, 1.5e-3), 0.02
+        grid = in_a_cone({}, 1.0, self.thin if is_there else None).grid
+        self.kernel = FilterKernel(grid, (False,) * 3, smoothing=0.015)
+        self.cells = self.kernel.map_particles(self.position, self.radius)
+        self.fluid = in_a_cone(conditions, self.voidage, self.thin if is_there else None)
+        self.heat = Scalar(self.fluid, kind, ScalarSides(lambda side, x, y, z: self.by_side(of_sides, x, y, z)))
+        points = np.broadcast_arrays(*self.fluid.grid.centres())
+        self.heat.value[:] = self.by_side(of_sides, *points)
+        self.temperature = self.by_side(of_sides, *self.position.T)
+        self.cells_on, self.on = (self.by_side((0.0, 1.0), *each) > 0.5 for each in (points, self.position.T))
+
+    @property
+    def voidage(self) -> np.ndarray:
+        """Of the cells of the fluid."""
+        return np.asarray(1.0 - self.kernel.solid_fraction(self.cells))
+
+    def by_side(self, values: tuple[float, float], *places: np.ndarray) -> np.ndarray:
+        """One of two values by the side of places x, y, z."""
+        side = self.thin.side(np.stack([each.ravel() for each in places], axis=-1) + ASIDE * 0.01)
+        return np.where(side > 0.0, values[1], values[0]).reshape(places[0].shape)
+
+    def step(self) -> None:
+        """Particles move a little on their side; the fluid follows, and both exchange heat."""
+        moved = self.position + self.random.uniform(-2e-4, 2e-4, self.position.shape)
+        stays = (self.by_side((0.0, 1.0), *moved.T) > 0.5) == self.on
+        self.position = np.where(stays[:, None], moved, self.position)
+        self.cells, h = self.kernel.map_particles(self.position, self.radius), 1e-3
+        self.fluid.step(h, self.voidage)
+        given = np.stack([np.full(300, 2.0), 2.0 * self.temperature], axis=1)  # conductance, in W/K
+        seen = self.heat.step(*(self.kernel.spread(self.cells, given) / self.fluid.grid.cell_volume))
+        around = self.kernel.sample(self.cells.stencil, self.radius, seen[None])[:, 0]
+        self.temperature = self.temperature + h * 2.0 / self.capacity * (around - self.temperature)
+
+    def content(self, on: bool) -> float:
+        """Heat of fluid and particles on a side, above 0 K [J]."""
+        heat, here = self.heat, self.cells_on == on
+        fluid = (heat.fields.owned("stored") * heat.flow.groups.volume * heat.value)[here].sum()
+        solids = self.capacity * self.temperature[self.on == on].sum()
+        return float(RHO_C * self.fluid.grid.cell_volume * fluid + solids)
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_both_sides_of_a_baffle_keep_their_temperatures_to_round_off_as_fluid_flows_beside_it(is_there: bool) -> None:
+    """Without the baffle they mix."""
+    both = Divided({"z_low": Inlet(0.3), "z_high": Outlet()}, (300.0, 400.0), is_there)
+    for _ in range(30):
+        both.step()
+    wet = both.heat.flow.groups.volume > 0.0
+    apart = [np.abs(both.heat.value - np.where(both.cells_on, 400.0, 300.0))[wet].max(),
+             np.abs(both.temperature - np.where(both.on, 400.0, 300.0)).max()]  # fmt: skip
+    print(f"fluid and particles are {apart[0]:.2g} and {apart[1]:.2g} K from the temperatures of their sides")
+    assert min(both.on.sum(), (~both.on).sum()) > 100
+    assert max(apart) < 1e-9 if is_there else min(apart) > 1.0
+
+
+def test_each_side_of_a_baffle_keeps_its_heat_in_a_closed_cone() -> None:
+    both = Divided({}, (300.0, 300.0))
+    both.temperature = both.random.uniform(280.0, 480.0, 300)
+    fluid = both.heat.content
+    before = [both.content(on) for on in (False, True)]
+    for _ in range(50):
+        both.step()
+    changed = [abs(both.content(on) / was - 1.0) for on, was in zip((False, True), before)]
+    print(f"heat of the sides changed by {changed[0]:.2g} and {changed[1]:.2g}")
+    assert max(changed) < 1e-12 and both.heat.content > fluid + 0.01
+
+
 # ---------------------------------------------------------------- a case
 
 CASE = (
@@ -219,6 +303,27 @@ def test_a_hot_inlet_through_a_patch_heats_the_particles_of_a_cone_and_the_balan
     assert found["heat_received"] > 0.1 * found["heat_in"] and found["heat_from_walls"] > 0.0
     assert found["heat_imbalance"] < 1e-12 and found["vapour_imbalance"] < 1e-12
     assert found["mean_temperature"] > 300.0
+
+
+def test_heat_and_vapour_beside_a_draft_tube_are_what_the_inlets_brought() -> None:
+    """By the fluid's own voidage and the temperatures of cells and particles, against the flux through the floor."""
+    tube = {"shape": "cylinder", "point": [0.03, 0.03, 0.0025], "radius": 0.0105, "length": 0.03, "solid": "thin"}
+    given = {"wall": [tube], "heat.wall_temperature": {}, "heat.patch_temperature": {}, "heat.inlet_temperature": 400.0,
+             "vapour.patch_fraction": {}, "vapour.inlet_fraction": 0.02}  # fmt: skip
+    simulation = Simulation(Case.from_text(CASE, "c.toml", given))
+    fluid, entered = simulation.fluid, 0.0
+    for _ in range(20):
+        simulation.step()
+        entered += fluid.last_step * fluid.face_areas[2] * float(fluid.volume_flux(2)[0].sum())
+    heat, found = simulation.feature(HeatExchange), row(simulation)
+    amount = fluid.grid.cell_volume * fluid.voidage * fluid.boundaries.cut.own_volume() * fluid.open_cells
+    in_fluid = 1200.0 * float((amount * (heat.cells.value - 300.0)).sum())
+    in_particles = float((heat.capacity(simulation.owned) * (simulation.owned.temperature - 300.0)).sum())
+    vapour = 1.2 * float((amount * simulation.feature(Vapour).cells.value).sum())
+    assert in_fluid + in_particles == pytest.approx(1200.0 * 100.0 * entered, rel=1e-6)
+    assert vapour == pytest.approx(1.2 * 0.02 * entered, rel=1e-6)
+    assert in_particles > 0.05 * in_fluid and (fluid.boundaries.cut.thin > 0.0).sum() > 50
+    assert found["heat_imbalance"] < 1e-12 and found["vapour_imbalance"] < 1e-12
 
 
 def test_a_hot_inlet_in_the_side_of_a_cone_brings_its_heat_and_the_balances_hold() -> None:

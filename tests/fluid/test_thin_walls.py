@@ -18,8 +18,6 @@ from cfddem.fluid.cell_groups import large_cells
 from cfddem.fluid.conditions import Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.cut_cells import open_share, within
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.scalar import Scalar, ScalarKind
-from cfddem.fluid.scalar_conditions import ScalarSides
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
 from cfddem.fluid.thin_walls import ASIDE, ThinWall, divided, thin_wall
@@ -218,13 +216,6 @@ def test_a_small_cell_without_a_large_one_on_its_side_has_a_group_of_its_own():
     share[0, 4, 5] = share[0, 1, 1] = 0.1
     small, home = large_cells(grid, share)
     assert home[45] == 45 and not small[0, 4, 5] and small.sum() == 1 and home[11] != 11
-
-
-def test_a_temperature_beside_thin_walls_is_refused_in_a_line():
-    grid = within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(0.55)))
-    fluid = FluidSolver(grid, {"z_low": Inlet(0.5), "z_high": Outlet()}, density=1.0, viscosity=1e-2)
-    with pytest.raises(InputError, match=r"thin walls: must be left out beside a temperature or a vapour; leave out"):
-        Scalar(fluid, ScalarKind("temperature", "K", "", 300.0, 1.0, 1.0), ScalarSides(300.0))
 
 
 @pytest.mark.parametrize("place", [0.0, 1.0])
