@@ -179,7 +179,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             {"column.cell": 0.004},
             "warning",
             "column.cell",
-            "0.004 m is 1.33 times the diameter; averages over cells below 2",
+            "0.004 m is 1.3 times the diameter; averages over cells below 2",
         ),
         ({"column.cell": 0.003}, "error", "column.cell", "0.00666667 m fits along x, y and z"),
         ({"laws.kernel_width": 0.1}, "warning", "laws.kernel_width", "filters nothing"),
