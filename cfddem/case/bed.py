@@ -79,7 +79,9 @@ class Species(Checked):
     )
     spread: float = Field(0.0, ge=0, lt=0.5, description="standard deviation of the diameter over its mean [-]")
     distribution: Literal["normal", "log_normal"] = Field("normal", description="size distribution, with a spread")
-    sizes: Sizes = Field((), description="[diameter, volume share] pairs, instead of a diameter [m, -]")
+    sizes: Sizes = Field(
+        (), description="[diameter, volume share] pairs, as of sieve fractions, instead of a diameter [m, -]"
+    )
     count: int | None = Field(None, gt=0, description="number of particles")
 
     @model_validator(mode="after")

@@ -369,7 +369,7 @@ SEVERAL |= {name: f"{name}.NUMBER" for name in ("wall", "feed", "outlet")}
 
 
 def matching(name: str) -> dict[str, FieldInfo]:
-    """A key, all keys of a table, those that contain a word, or those with it as a choice; empty if nothing matches.
+    """A key, all keys of a table, or those with a word: in their names, as a choice, or else in their descriptions.
 
     >>> key_lines(matching("bed.jet.velocity")), key_lines(matching("run.until"))[0][:34]
     (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
@@ -381,6 +381,7 @@ def matching(name: str) -> dict[str, FieldInfo]:
     ]
     keys = keys or [key for key in every if word in key.lower()]
     keys = keys or [key for key, field in every.items() if word in key_summary(key, field)["choices"]]
+    keys = keys or [key for key, field in every.items() if word in re.findall(r"\w{4,}", field.description or "")]
     return {key: every[key] for key in keys}
 
 

@@ -100,7 +100,7 @@ def _check_smallest_cell(case: Case, smallest: float, suggests: bool = True) -> 
     elif smallest < FEWEST_DIAMETERS * case.bed.diameter * (1.0 - 1e-9):
         yield Issue(
             "warning", "column.cell",
-            f"{smallest:.3g} m is {smallest / case.bed.diameter:.2g} times the diameter; averages over cells below "
+            f"{smallest:.3g} m is {smallest / case.bed.diameter:.3g} times the diameter; averages over cells below "
             f"{FEWEST_DIAMETERS:g} diameters have no meaning",
             f"use larger cells: {cells(FEWEST_DIAMETERS * case.bed.diameter)}",
         )  # fmt: skip

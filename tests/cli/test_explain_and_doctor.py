@@ -64,6 +64,7 @@ def test_what_is_not_there_is_said_of_tables_and_of_words_that_are_asked_for() -
     assert "reactions" in parsed(call("explain", "heat", "--json").out)["not_there"]
     assert call("explain", "bed.diameter").out.count("Not there") == 0
     assert "[contact_heat] of contacts" in call("explain", "cooling").err
+    assert call("explain", "sieve").out.startswith("bed.sizes"), "a word of a description"
     for words in (
         ("check", "liquid-bed", "--set", "fluid.turbulence=1"),
         ("check", "liquid-bed", "--set", "k_epsilon=1"),
