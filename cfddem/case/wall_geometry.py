@@ -50,12 +50,17 @@ def triangles(wall: CaseWall) -> Array:
 
 def _around(wall: CaseWall) -> Array:
     """Triangles of an open cylinder or cone (T, 3, 3) [m]."""
-    axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
-    around, own = circle(axis, SIDES), wall.radius or 0.0
+    axis = direction(wall)
+    around, (own, top) = circle(axis, SIDES), wall.radii
     low = np.array(wall.point) + own * around
-    high = np.array(wall.point) + (wall.length or 0.0) * axis + (wall.top_radius or own) * around
+    high = np.array(wall.point) + (wall.length or 0.0) * axis + top * around
     after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
     return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
+
+
+def direction(wall: CaseWall) -> Array:
+    """Axis of a cylinder or cone, of unit length (3,)."""
+    return np.asarray(np.array(wall.axis) / np.linalg.norm(wall.axis))
 
 
 def circle(axis: Array, count: int) -> Array:
@@ -87,19 +92,15 @@ def encloses(wall: CaseWall) -> bool:
 
 def extent(wall: CaseWall) -> Array | None:
     """Lower and upper corner of a box around a wall at the start (2, 3) [m]; None if the wall has no end."""
-    if wall.shape in ("surface", "plate"):
+    if wall.has_triangles:
         corners = triangles(wall).reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
     if wall.length is None:
         return None
-    axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
+    axis = direction(wall)
     ends = np.array([wall.point, np.array(wall.point) + wall.length * axis])
-    radii = [wall.radius or 0.0, wall.top_radius or wall.radius or 0.0]
-    across = np.sqrt(np.maximum(1.0 - axis**2, 0.0))
-    reach = [radius * across for radius in radii]
-    return np.array([
-        np.minimum(*(end - r for end, r in zip(ends, reach))), np.maximum(*(end + r for end, r in zip(ends, reach)))
-    ])  # fmt: skip
+    reach = np.outer(wall.radii, np.sqrt(np.maximum(1.0 - axis**2, 0.0)))
+    return np.array([(ends - reach).min(axis=0), (ends + reach).max(axis=0)])
 
 
 def distance(wall: CaseWall, points: Array) -> Array:
@@ -107,16 +108,16 @@ def distance(wall: CaseWall, points: Array) -> Array:
 
     Negative behind a wall with one side. NaN for a surface from a file and for a plate.
     """
-    if wall.shape in ("surface", "plate"):
+    if wall.has_triangles:
         return np.full(len(points), np.nan)
     if wall.shape == "plane":
         normal = np.array(wall.normal) / np.linalg.norm(wall.normal)
         return np.asarray((points - np.array(wall.point)) @ normal)
     height, radius = _about_axis(wall, points)
-    own, length = wall.radius or 0.0, wall.length
+    (own, top), length = wall.radii, wall.length
     if wall.is_open:
         assert length is not None
-        slope = (wall.top_radius or own) - own
+        slope = top - own
         along = np.clip(((radius - own) * slope + height * length) / (slope**2 + length**2), 0.0, 1.0)
         return np.hypot(radius - own - along * slope, height - along * length)
     side = radius - own
@@ -137,16 +138,15 @@ def solid_part(wall: CaseWall, points: Array) -> NDArray[np.bool_]:
     if not wall.is_open:
         return distance(wall, points) < 0.0
     height, radius = _about_axis(wall, points)
-    length, own = wall.length or 0.0, wall.radius or 0.0
-    there = own + ((wall.top_radius or own) - own) * height / length
+    length, (own, top) = wall.length or 0.0, wall.radii
+    there = own + (top - own) * height / length
     beside = (height >= 0.0) & (height <= length)
     return beside & ((radius > there) if wall.solid == "outside" else (radius < there))
 
 
 def _about_axis(wall: CaseWall, points: Array) -> tuple[Array, Array]:
     """Height along the axis and distance from it (N,), (N,) [m]."""
-    axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
-    away = points - np.array(wall.point)
+    axis, away = direction(wall), points - np.array(wall.point)
     height = away @ axis
     return height, np.linalg.norm(away - height[:, None] * axis, axis=1)
 

@@ -115,7 +115,7 @@ class CaseWall(Checked):
             raise InputError("edges", shown(self.edges), "two edges in different directions, in m")
         if self.shape == "plate" and self.solid in ("inside", "outside"):
             raise InputError("solid", self.solid, "thin, none, or left out", "a plate has no inside")
-        sided = self.shape not in ("surface", "plate") and not self.is_open
+        sided = not self.has_triangles and not self.is_open
         if self.solid in ("inside", "outside", "thin") and sided:
             raise InputError("solid", self.solid, "none, or left out", "the side without particles is solid")
 
@@ -136,6 +136,17 @@ class CaseWall(Checked):
             raise InputError("spin", self.spin, "along the normal of a plane", "use a surface for a plate that tilts")
         if self.shape == "cylinder" and self.length is None and not self._spins_in_place:
             raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
+
+    @property
+    def has_triangles(self) -> bool:
+        """Whether the wall is made of triangles: a surface from a file, or a plate."""
+        return self.shape in ("surface", "plate")
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radii of the lower and upper end of a cylinder or cone [m]."""
+        own = self.radius or 0.0
+        return own, self.top_radius or own
 
     @property
     def is_open(self) -> bool:
@@ -170,7 +181,7 @@ class CaseWall(Checked):
             return not abs(float(drift @ np.array(self.normal))) <= IN_PLACE * _norm(drift) * _norm(self.normal)
         if self.shape == "cylinder" and self.length is None:
             return not _parallel(drift, self.axis)
-        if self.shape in ("surface", "plate"):
+        if self.has_triangles:
             return self.moves
         return bool(drift.any()) or not self._spins_in_place
 
@@ -186,7 +197,7 @@ class CaseWall(Checked):
         turning = 0.0
         if any(self.spin):
             arm = np.subtract(self.point if self.centre is None else self.centre, self.point)
-            reach = max(self.radius or 0.0, self.top_radius or 0.0) + (self.length or 0.0) * (not self._spins_in_place)
+            reach = max(self.radii) + (self.length or 0.0) * (not self._spins_in_place)
             across = _norm(arm) * (not self._spins_in_place)
             turning = _norm(self.spin) * (reach + across) if self.shape in ("cylinder", "cone") else math.nan
             turning = 0.0 if self.shape == "plane" else turning

@@ -71,12 +71,12 @@ def wall_of(wall: CaseWall, material: int, key: str) -> Wall:
             return Mesh.of_corners(triangles(wall), **common)
         if wall.shape == "cylinder":
             return Cylinder(
-                point=wall.point, axis=wall.axis, radius=wall.radius or 0.0, length=wall.length, caps=wall.caps,
+                point=wall.point, axis=wall.axis, radius=wall.radii[0], length=wall.length, caps=wall.caps,
                 outside=wall.outside, **common,
             )  # fmt: skip
         if wall.shape == "cone":
             return Cone(
-                point=wall.point, axis=wall.axis, radius=wall.radius or 0.0, top_radius=wall.top_radius or 0.0,
+                point=wall.point, axis=wall.axis, radius=wall.radii[0], top_radius=wall.radii[1],
                 length=wall.length or 0.0, **common,
             )  # fmt: skip
         return Mesh.from_stl(wall.file or "", scale=wall.scale, place=wall.point, **common)

@@ -14,7 +14,7 @@ from cfddem.case.liquid import Spray
 from cfddem.case.openings import outline
 from cfddem.case.patches import ENDS, PLANES, CasePatch, lengths_of, middle_of
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import extent, triangles
+from cfddem.case.wall_geometry import direction, extent, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -229,7 +229,7 @@ OUTLINE: dict[str, Any] = {"color": "#222222", "linewidth": 1.6}
 
 def _wall(axes: Axes, wall: CaseWall, width: float, height: float) -> None:
     """The outline of a wall as seen along y."""
-    if wall.shape in ("surface", "plate"):
+    if wall.has_triangles:
         _surface(axes, wall)
     elif wall.shape == "plane":
         (nx, _, nz), (px, _, pz) = wall.normal, wall.point
@@ -254,21 +254,20 @@ def _round(axes: Axes, wall: CaseWall, far: float) -> None:
 
     far  length of a wall without ends, to each side [m]
     """
-    axis, begin = np.array(wall.axis)[::2] / math.hypot(*wall.axis), np.array(wall.point)[::2]
-    radius = wall.radius or 0.0
+    axis, begin = direction(wall)[::2], np.array(wall.point)[::2]
     if math.hypot(*axis) < 0.5 and extent(wall) is not None:
         angle = np.linspace(0.0, 2.0 * math.pi, 100)
-        axes.plot(begin[0] + radius * np.cos(angle), begin[1] + radius * np.sin(angle), **OUTLINE)
+        axes.plot(begin[0] + wall.radii[0] * np.cos(angle), begin[1] + wall.radii[0] * np.sin(angle), **OUTLINE)
         return
     end = begin + (wall.length or far) * axis
     if wall.length is None:
         begin = begin - far * axis
     normal = np.array([-axis[1], axis[0]])
-    radii = radius, radius if wall.top_radius is None else wall.top_radius
+    low, high = wall.radii
     for side in (-1.0, 1.0):
-        axes.plot(*zip(begin + side * radii[0] * normal, end + side * radii[1] * normal), **OUTLINE)
+        axes.plot(*zip(begin + side * low * normal, end + side * high * normal), **OUTLINE)
     if wall.caps:
-        for centre, size in zip((begin, end), radii):
+        for centre, size in zip((begin, end), wall.radii):
             axes.plot(*zip(centre - size * normal, centre + size * normal), **OUTLINE)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.analysis.report import case_of
 from cfddem.backend.errors import CfddemError
-from cfddem.case.wall_geometry import circle, extent, triangles
+from cfddem.case.wall_geometry import circle, direction, extent, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.io.reading import RunData
 from cfddem.particles.walls.motion import Motion
@@ -79,21 +79,19 @@ def _surface(wall: CaseWall, bounds: np.ndarray) -> Any:
 
     point, middle = np.array(wall.point), bounds.mean(axis=1)
     far = 2.0 * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0])) + float(np.linalg.norm(middle - point))
-    if wall.shape in ("surface", "plate"):
+    if wall.has_triangles:
         corners = triangles(wall)
         return _polygons(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)).clean()
     if wall.shape == "plane":
         return pyvista.Plane(point, wall.normal, far, far, 1, 1)
     low, high = (0.0, wall.length) if wall.length is not None else (-far, far)
-    own = wall.radius or 0.0
-    return _round(point, np.array(wall.axis), (low, high), (own, wall.top_radius or own), wall.caps)
+    return _round(point, direction(wall), (low, high), wall.radii, wall.caps)
 
 
 def _round(
     point: np.ndarray, axis: np.ndarray, ends: tuple[float, float], radii: tuple[float, float], caps: bool
 ) -> Any:
-    """A surface of revolution between two circles."""
-    axis = axis / np.linalg.norm(axis)
+    """A surface of revolution about an axis of unit length between two circles."""
     around = circle(axis, AROUND)
     points = np.concatenate([point + end * axis + radius * around for end, radius in zip(ends, radii)])
     here, after = np.arange(AROUND), np.roll(np.arange(AROUND), -1)
@@ -120,9 +118,8 @@ def _moved(mesh: Any, wall: CaseWall, time: float) -> Any:
     end = math.inf if wall.end is None else wall.end
     motion = Motion(0, wall.velocity, wall.spin, wall.amplitude, wall.frequency, wall.begin, end)
     if any(wall.spin):
-        axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
-        middle = np.array(wall.point) + 0.5 * (wall.length or 0.0) * axis
-        if wall.shape in ("surface", "plate"):
+        middle = np.array(wall.point) + 0.5 * (wall.length or 0.0) * direction(wall)
+        if wall.has_triangles:
             middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
         turned = math.degrees(math.hypot(*wall.spin) * motion.active(time))
         mesh = mesh.rotate_vector(wall.spin, turned, point=middle if wall.centre is None else wall.centre)

@@ -75,7 +75,7 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         if any(issue.severity == "error" for issue in issues):
             return
     yield from _check_place(case, wall, key)
-    ends = {"radius": wall.radius or 0.0, "top_radius": wall.top_radius or 0.0}
+    ends = dict(zip(("radius", "top_radius"), wall.radii))
     narrow = min(ends, key=lambda end: ends[end])
     opening = 2.0 * ends[narrow] if wall.shape == "cone" and wall.solid != "inside" else 0.0
     if 0.0 < opening < case.bed.largest_diameter:
@@ -93,9 +93,8 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         )  # fmt: skip
     if wall in case.thin_walls and wall.is_open and (across := cells_across(case, wall)) < FEWEST_ACROSS:
         reason = f"{across:.2g} cells across the opening; its flow needs at least {FEWEST_ACROSS:g}"
-        end = narrow if wall.top_radius else "radius"
         yield Issue(
-            "warning", f"{key}.{end}", reason, "use smaller cells, but of at least 2 diameters, or a wider wall"
+            "warning", f"{key}.{narrow}", reason, "use smaller cells, but of at least 2 diameters, or a wider wall"
         )
     if wall.moves and (case.closes_cells(wall) or wall in case.thin_walls):
         yield Issue(
@@ -112,14 +111,12 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
 
 def cells_across(case: Case, wall: CaseWall) -> float:
     """Cells across the narrowest part of an open wall."""
-    own = wall.radius or 0.0
-    return 2.0 * min(own, wall.top_radius or own) / max(case.column.cell_edges)
+    return 2.0 * min(wall.radii) / max(case.column.cell_edges)
 
 
 def area_by_cells(case: Case, wall: CaseWall) -> float:
     """Area of the cells whose centres an upright thin wall holds half way up, over its own [-]."""
-    counts, own = cell_counts(case.column.size, case.column.cell), wall.radius or 0.0
-    radius = 0.5 * (own + (wall.top_radius or own))
+    counts, radius = cell_counts(case.column.size, case.column.cell), 0.5 * sum(wall.radii)
     x, y = ((np.arange(n) + 0.5) * length / n for n, length in zip(counts[:2], case.column.size))
     inside = np.hypot(x[None, :] - wall.point[0], y[:, None] - wall.point[1]) < radius
     cells = float(np.count_nonzero(inside)) * case.column.size[0] * case.column.size[1] / (counts[0] * counts[1])
