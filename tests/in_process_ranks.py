@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import pickle
-import queue
 import threading
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,57 +12,74 @@ import numpy as np
 from cfddem.backend.communicator import Communicator, Value
 from cfddem.backend.compile import use_threads
 
-PATIENCE = 300
-"""How long a rank waits for another [s]."""
+
+class EndedByOthersError(Exception):
+    """Another rank has failed, or all wait for each other."""
 
 
 class Board:
-    """Where ranks leave their values for each other. Only the rank that holds the turn runs."""
+    """Where ranks leave their values for each other. One rank runs at a time, until it has to wait for others."""
 
     def __init__(self, size: int) -> None:
-        self.size, self.turn = size, threading.Lock()
-        self._values: list[Any] = [None] * size
-        self._barrier = threading.Barrier(size)
-        self._mail: dict[tuple[int, int], queue.SimpleQueue[bytes]] = defaultdict(queue.SimpleQueue)
+        self.size, self.failed = size, False
+        self._values: tuple[list[Any], ...] = [None] * size, [None] * size  # of the present gather and of the last
+        self._rounds = [0] * size
+        self._mail: dict[tuple[int, int], deque[np.ndarray]] = defaultdict(deque)
+        self._turns = [threading.Lock() for _ in range(size)]
+        for turn in self._turns:
+            turn.acquire()
+        self._ready, self._gathering = deque(range(size)), list[int]()
+        self._receiving: dict[tuple[int, int], int] = {}
 
     def gather(self, rank: int, value: Any) -> list[Any]:
         """The values of all ranks, in their order."""
-        self._values[rank] = value
-        self._wait()
-        values = list(self._values)
-        self._wait()
-        return values
+        values = self._values[self._rounds[rank] % 2]
+        values[rank] = value
+        self._rounds[rank] += 1
+        self._gathering.append(rank)
+        if len(self._gathering) < self.size:
+            self._wait(rank)
+        else:
+            self._ready += self._gathering[:-1]
+            self._gathering.clear()
+        return list(values)
 
-    def send(self, sender: int, receiver: int, value: Any) -> None:
-        """Leave a value for another rank."""
-        self._mail[sender, receiver].put(pickle.dumps(value))  # as between processes
+    def send(self, sender: int, receiver: int, values: np.ndarray) -> None:
+        """Leave a copy of an array for another rank."""
+        self._mail[sender, receiver].append(values.copy())
+        if self._receiving.pop((sender, receiver), None) is not None:
+            self._ready.append(receiver)
 
-    def receive(self, sender: int, receiver: int) -> Any:
-        """The next value that a rank has left for this one."""
-        mail = self._mail[sender, receiver]
-        for _ in range(PATIENCE):
-            if not mail.empty():
-                return pickle.loads(mail.get())
-            self.turn.release()
-            try:
-                return pickle.loads(mail.get(timeout=1.0))
-            except queue.Empty:
-                if self._barrier.broken:
-                    break
-            finally:
-                self.turn.acquire()
-        raise threading.BrokenBarrierError
+    def receive(self, sender: int, receiver: int) -> np.ndarray:
+        """The next array that a rank has left for this one."""
+        if not self._mail[sender, receiver]:
+            self._receiving[sender, receiver] = receiver
+            self._wait(receiver)
+        return self._mail[sender, receiver].popleft()
 
-    def _wait(self) -> None:
-        self.turn.release()
-        try:
-            self._barrier.wait(timeout=PATIENCE)
-        finally:
-            self.turn.acquire()
+    def _wait(self, rank: int) -> None:
+        self.pass_on()
+        self.take_turn(rank)
+
+    def take_turn(self, rank: int) -> None:
+        """Wait for the turn of a rank."""
+        self._turns[rank].acquire()
+        if self.failed:
+            raise EndedByOthersError
+
+    def pass_on(self) -> None:
+        """Let the next rank run; if all that are left wait for each other, let them fail."""
+        if self._ready:
+            self._turns[self._ready.popleft()].release()
+        elif self._gathering or self._receiving:
+            self.give_up()
 
     def give_up(self) -> None:
-        """Let the other ranks fail, too."""
-        self._barrier.abort()
+        """Let all ranks that wait fail."""
+        waiting = set() if self.failed else {*self._ready, *self._gathering, *self._receiving.values()}
+        self.failed = True
+        for rank in waiting:
+            self._turns[rank].release()
 
 
 class Rank(Communicator):
@@ -102,21 +117,24 @@ def on_ranks(size: int, program: Callable[[Communicator], Any], threads: int | N
     board, results, errors = Board(size), [None] * size, []
 
     def run(rank: int) -> None:
-        with board.turn:
+        try:
+            board.take_turn(rank)
             use_threads(threads)  # a new thread of Python begins with all
-            try:
-                results[rank] = program(Rank(rank, board))
-            except threading.BrokenBarrierError:
-                pass
-            except BaseException as error:
-                errors.append(error)
-                board.give_up()
+            results[rank] = program(Rank(rank, board))
+            board.pass_on()
+        except EndedByOthersError:
+            pass
+        except BaseException as error:
+            errors.append(error)
+            board.give_up()
 
     begun = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
     for each in begun:
         each.start()
+    board.pass_on()
     for each in begun:
         each.join()
     if errors:
         raise errors[0]
+    assert not board.failed, "the ranks wait for each other"
     return results

@@ -56,6 +56,12 @@ class GhostOwners(NamedTuple):
     begins: np.ndarray  # (cells + 1,) first place of each home in `order`
 
 
+def _sorted_by_home(homes: np.ndarray, cells: int) -> GhostOwners:
+    """The owners of homes (n,) among so many cells."""
+    order = np.argsort(homes, kind="stable")
+    return GhostOwners(homes, order, np.searchsorted(homes[order], np.arange(cells + 1)))
+
+
 class GhostDeposit:
     """The cells that the particles of a rank reach.
 
@@ -104,14 +110,13 @@ class GhostDeposit:
 
     def homes(self) -> GhostOwners:
         """Homes of the cells and of the layer around them."""
-        homes = self._home_of_each()
-        layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
-        own = layered[1:-1, 1:-1, 1:-1].ravel()
-        order = np.argsort(homes, kind="stable")
-        return GhostOwners(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
+        return _sorted_by_home(self.home_of_each(), math.prod(self.shape))
 
-    def _home_of_each(self) -> np.ndarray:
-        """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""
+    def home_of_each(self, others: Any = None) -> np.ndarray:
+        """Cell that receives the deposit on each of the cells and of a layer around them; flat indices.
+
+        others  home of every cell of the whole grid, beside its solid cells (cells,)
+        """
         whole, counts = self.grid.whole, self.grid.whole.cells
         lines = []
         for first, last, count, repeats, wraps in zip(*self._box, counts, self.periodic, self.wraps):
@@ -124,12 +129,18 @@ class GhostDeposit:
         homes = np.array(np.meshgrid(*lines[::-1], indexing="ij"))
         if whole.solid is not None:
             nearest_open = distance_transform_edt(whole.solid, sampling=whole.spacing[::-1], return_indices=True)[1]
-            at = tuple(homes % np.array(counts[::-1])[:, None, None, None])
-            homes += nearest_open[:, *at] - np.array(at)
+            homes = self._moved(homes, nearest_open)
+        if others is not None:
+            homes = self._moved(homes, np.array(np.unravel_index(others, whole.shape)).reshape(3, *whole.shape))
         begin = self._box[0][::-1, None, None, None]
         # a particle cannot reach a home so deep in the solid that it lies outside
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
         return np.ravel_multi_index(tuple(inside), self.shape).ravel()
+
+    def _moved(self, cells: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Cells (3, ...), maybe beyond periodic sides, each moved to another as that of the whole grid is."""
+        at = tuple(cells % np.array(self.grid.whole.shape)[:, None, None, None])
+        return np.asarray(cells + others[:, *at] - np.array(at))
 
     def axes(self) -> Axes:
         """These cells along x, y, z."""
@@ -248,12 +259,12 @@ class TwoSides(OneSide):
     """Of a grid with thin walls.
 
     grid   of the fluid, whole
-    cells  grid whose open cells take deposits
-    homes  without thin walls
-    axes   of the cells
+    cells  whole grid whose open cells take deposits
+    reach  of particles
+    axes   of the cells that they reach
     """
 
-    def __init__(self, grid: Grid, cells: Grid, homes: GhostOwners, axes: Axes) -> None:
+    def __init__(self, grid: Grid, cells: Grid, reach: GhostDeposit, axes: Axes) -> None:
         self._thin: ThinWall = grid.walls.thin
         spacing = np.array(grid.spacing)
         centres = (
@@ -261,7 +272,7 @@ class TwoSides(OneSide):
             + ASIDE * spacing
         )
         away, is_open = self._thin.side(centres), cells.open.ravel()
-        near = np.flatnonzero(np.abs(away) < BESIDE * spacing.max())  # local: one process
+        near = np.flatnonzero(np.abs(away) < BESIDE * spacing.max())  # local: every rank knows the whole box
         of_side = []
         for sign in (1.0, -1.0):
             mine = ((sign * away > 0.0) & is_open).reshape(grid.shape)
@@ -270,10 +281,8 @@ class TwoSides(OneSide):
                 nearest = distance_transform_edt(~mine, sampling=grid.spacing[::-1], return_indices=True)[1]
                 nearest_cells = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()[near]
                 home[near] = np.where(self._thin.between(centres[near], centres[nearest_cells]), nearest_cells, near)
-            of_side.append(home[homes.of_layered])
-        both = np.concatenate(of_side)
-        order = np.argsort(both, kind="stable")
-        super().__init__(GhostOwners(both, order, np.searchsorted(both[order], np.arange(away.size + 1))))
+            of_side.append(reach.home_of_each(home))
+        super().__init__(_sorted_by_home(np.concatenate(of_side), math.prod(reach.shape)))
         shape = tuple(int(n) + 2 for n in axes.cells[::-1])
         differs: Any = (of_side[0] != of_side[1]).reshape(shape)
         for axis in range(3):  # a particle beside such a cell, which is one of its eight
@@ -282,10 +291,13 @@ class TwoSides(OneSide):
 
     def choose(self, position: Array, first: np.ndarray) -> None:
         """See `OneSide.choose`."""
-        rows = np.flatnonzero(self._beside[first].any(axis=1))  # local: likewise
+        rows = np.flatnonzero(self._beside[first].any(axis=1))  # local: pieces of a particle
         first[rows[self._thin.side(position[rows]) < 0.0]] += np.uint32(self._count)
 
 
-def sides_of(grid: Grid, cells: Grid, homes: GhostOwners, axes: Axes) -> OneSide:
-    """The cells of particles on both sides of thin walls, or of all particles where a grid has none."""
-    return TwoSides(grid, cells, homes, axes) if isinstance(grid.walls, TwoSided) else OneSide(homes)
+def sides_of(grid: Grid, cells: Grid, reach: GhostDeposit, axes: Axes) -> OneSide:
+    """The cells of particles on both sides of thin walls, or of all particles where a grid has none.
+
+    grid, cells, reach, axes  as of `TwoSides`
+    """
+    return TwoSides(grid, cells, reach, axes) if isinstance(grid.walls, TwoSided) else OneSide(reach.homes())

@@ -130,7 +130,7 @@ class FilterKernel:
         """Find the cells that particles reach by the present division of space."""
         self.reach = GhostDeposit(self._merged.grid, self.periodic, self._parts, self.owners.division)
         self._axes = self.reach.axes()
-        self._sides = sides_of(self.grid, self._merged.grid, self.reach.homes(), self._axes)
+        self._sides = sides_of(self.grid.whole, self._merged.grid.whole, self.reach, self._axes)
         self._homes = self._sides.homes
         _, ny, nx = self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
@@ -323,7 +323,7 @@ class FilterKernel:
     def _layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
-        fields = self._merged.mean(fields)  # local: of merged cells, for one process alone
+        fields = self._merged.averaged(fields)
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
@@ -333,7 +333,7 @@ class FilterKernel:
         stage  one of `stages`; that of the widest kernel if None
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
-        fields = self._merged.mean(fields)  # local: of merged cells, for one process alone
+        fields = self._merged.averaged(fields)
         if sweeps == 0:
             return np.array(fields, float)
         now, other = self._scratch(len(fields))

@@ -3,18 +3,21 @@
 Particles deposit on the large cell of a group, and what they deposit is divided by the open volume of the group: all
 cells of a group have one value, in the part of the cell that is fluid. A gathered field is the mean over a group, by
 open volumes. The two are adjoint, so that what particles give to the cells they get from them.
+
+The groups are those of the whole box, see :class:`cfddem.fluid.cell_groups.Groups`: on any number of ranks the same.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError
-from cfddem.fluid.cell_groups import large_cells
-from cfddem.fluid.cut_cells import cut_cells_of_box
+from cfddem.fluid.block import Block
+from cfddem.fluid.cell_groups import Groups
+from cfddem.fluid.cut_cells import CutCells, cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
 
@@ -29,7 +32,7 @@ class SingleCells:
         """Deposits (m, nz, ny, nx) over the open share of their groups, in all cells of these."""
         return deposits
 
-    def mean(self, fields: Array) -> Array:
+    def averaged(self, fields: Array) -> Array:
         """Mean of fields (m, nz, ny, nx) over the groups, in all cells of these."""
         return fields
 
@@ -52,43 +55,46 @@ class MergedCells(SingleCells):
     """The groups of a grid with smooth walls."""
 
     def __init__(self, grid: Grid, periodic: Any) -> None:
-        if grid.whole is not grid:
-            raise InputError("ranks", None, "1 for particles within smooth walls", "take one process, or solid cells")
-        self._cut = cut_cells_of_box(grid, tuple(bool(axis) for axis in periodic))
-        open_share = self._cut.own_volume() * grid.open
-        small, self._home = large_cells(grid, open_share)
-        super().__init__(replace(grid, solid=small, walls=None))
-        total = np.bincount(self._home, weights=open_share.ravel(), minlength=self._home.size)
-        self._open, self._total = open_share.ravel(), total[self._home]
+        whole, self._groups = grid.whole, Groups(grid, periodic)
+        cells = replace(whole, solid=self._groups.small, walls=None)
+        super().__init__(Block(cells, grid.division, grid.communicator) if isinstance(grid, Block) else cells)
+        self._box: CutCells = cut_cells_of_box(whole, tuple(bool(axis) for axis in periodic))
+        at, self._total = self._groups.at, np.ones(grid.shape)
+        self._total.reshape(-1)[at] = self._groups.total
+        self._open = self._groups.volume.ravel()[at]
 
     def shared(self, deposits: Array) -> Array:
         """See `SingleCells.shared`."""
-        flat = deposits.reshape(len(deposits), -1)
-        return np.asarray((flat[:, self._home] / self._total).reshape(deposits.shape))
+        return self._taken(deposits, self._groups.copied) / self._total
 
-    def mean(self, fields: Array) -> Array:
-        """See `SingleCells.mean`."""
-        flat = fields.reshape(len(fields), -1) * self._open
-        sums = np.stack([np.bincount(self._home, weights=values, minlength=values.size) for values in flat])
-        return np.asarray((sums[:, self._home] / self._total).reshape(fields.shape))
+    def averaged(self, fields: Array) -> Array:
+        """See `SingleCells.averaged`."""
+        return self._taken(fields, lambda values: self._groups.summed(values * self._open) / self._groups.total)
 
     def copied(self, fields: Array) -> Array:
         """See `SingleCells.copied`."""
-        return np.asarray(fields.reshape(len(fields), -1)[:, self._home].reshape(fields.shape))
+        return self._taken(fields, self._groups.copied)
+
+    def _taken(self, fields: Array, of_groups: Callable[[Array], Array]) -> Array:
+        """A copy of fields (m, nz, ny, nx) with other values in the cells of groups."""
+        taken = np.array(fields, float)
+        flat, at = taken.reshape(len(taken), -1), self._groups.at
+        flat[:, at] = of_groups(flat[:, at])
+        return taken
 
     def relax(self, before: Array, after: Array) -> None:
         """See `SingleCells.relax`."""
-        after[:] = before + (after - before) / self._total.reshape(after.shape[1:])
+        after[:] = before + (after - before) / self._total
 
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
         """See `SingleCells.gates`; never more than a group is open, so that sweeps stay stable."""
-        total, whole = halo.padded(self._total.reshape(self.grid.shape)), super().gates(halo)
-        gates = []
-        for axis in range(3):
-            apertures = halo.padded(self.grid.inner(self._cut.aperture[axis]))
-            least = np.minimum(total, np.roll(total, 1, axis=2 - axis))
-            gates.append(whole[axis] * np.minimum(apertures, least))
-        return gates[0], gates[1], gates[2]
+        total, gates = halo.padded(self._total), super().gates(halo)
+        grid, apertures = self.grid, self._box.grid.inner(self._box.aperture)
+        least = [np.minimum(total, np.roll(total, 1, axis=2 - axis)) for axis in range(3)]
+        x, y, z = (
+            gate * np.minimum(halo.padded(grid.part(share)), most) for gate, share, most in zip(gates, apertures, least)
+        )
+        return x, y, z
 
 
 def merged_cells(grid: Grid, periodic: Any) -> SingleCells:

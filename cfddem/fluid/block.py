@@ -130,6 +130,17 @@ def region_of(starts: Starts, place: Sequence[int], more: Sequence[int] = (0, 0,
     return (Ellipsis, *cuts[::-1])
 
 
+def owners(grid: Grid) -> NDArray[np.int64]:
+    """The rank that owns every cell of the whole grid (nz, ny, nx); 0 in one process."""
+    if not isinstance(grid, Block):
+        return np.zeros(grid.shape, np.int64)
+    x, y, z = (np.repeat(np.arange(len(begins) - 1), np.diff(begins)) for begins in grid.division.starts)
+    ranks: NDArray[np.int64] = np.ravel_multi_index(
+        (x[None, None, :], y[None, :, None], z[:, None, None]), grid.division.shape
+    )
+    return ranks
+
+
 def put_together(values: np.ndarray, starts: Starts, communicator: Communicator, faces: bool = False) -> np.ndarray:
     """The array over the whole grid of which every rank has a part (..., nz, ny, nx).
 

@@ -2,6 +2,9 @@
 
 A scalar has one value in all cells of a group, and the balance of a group is that of its open volume. So a cell of any
 size takes part without limiting the step, and nothing is lost between cells. No group reaches through a thin wall.
+
+Groups are those of the whole box, which every rank finds before the run starts. Where a group has cells of several
+ranks, that of its large cell adds them, in the order of one process, and gives the sum back.
 """
 
 from __future__ import annotations
@@ -12,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
-from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
-from cfddem.fluid.cut_cells import CutCells
+from cfddem.fluid.block import owners
+from cfddem.fluid.cut_cells import CutCells, cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.near_walls_loops import shut
 from cfddem.fluid.solver import FluidSolver
@@ -33,18 +36,21 @@ REACH = 3
 def large_cells(grid: Grid, open_share: Any) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Which cells are too small for a group of their own (nz, ny, nx), and the large cell of every one, flat.
 
-    A small cell without a large one on its side of the thin walls has a group of its own.
+    A small cell without a large one on its side of the thin walls has a group of its own, and so has a solid cell that
+    is farther than `BEYOND` layers from the fluid.
 
+    grid        whole
     open_share  of every cell, 0 in solid cells (nz, ny, nx)
     """
     small = open_share < LEAST
     if small.all():
         raise InputError("walls", None, "such that some cells are at least half open", "take smaller cells")
     nearest = distance_transform_edt(small, sampling=grid.spacing[::-1], return_indices=True)[1]
-    home = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
+    beside = binary_dilation(open_share > 0.0, iterations=BEYOND).ravel()
+    home = np.where(beside, np.ravel_multi_index(tuple(nearest), grid.shape).ravel(), np.arange(small.size))
     if isinstance(grid.walls, TwoSided):
         home = _on_one_side(grid, small, np.flatnonzero(small & (open_share > 0.0)), home)
-        small = small & (home != np.arange(home.size)).reshape(small.shape)
+        small = small & ((open_share == 0.0) | (home != np.arange(home.size)).reshape(small.shape))
     return small, home
 
 
@@ -68,6 +74,63 @@ def _on_one_side(
     home = home.copy()
     home[across] = np.where(reached.any(axis=1), nearest, across)
     return home
+
+
+Columns = dict[int, NDArray[np.int64]]
+"""By rank, columns of an array."""
+
+
+class Groups:
+    """The cells of a grid, or of the block of a rank, that are not one whole cell by themselves.
+
+    at      flat indices of these cells (n,)
+    total   open volume of the group of each, over that of a cell (n,)
+    volume  share of every cell of the grid that is open (nz, ny, nx)
+    small   whether each cell of the whole grid is too small for a group of its own (nz, ny, nx)
+    """
+
+    def __init__(self, grid: Grid, periodic: Any) -> None:
+        whole = grid.whole
+        share = cut_cells_of_box(whole, tuple(bool(axis) for axis in periodic)).own_volume() * whole.open
+        self.small, home = large_cells(whole, share)
+        self.volume, self._communicator = grid.part(share), grid.communicator
+        total = np.bincount(home, weights=share.ravel(), minlength=home.size)[home]
+        single = (np.bincount(home, minlength=home.size)[home] == 1) & ((total == 1.0) | (total == 0.0))
+        grouped, owner, rank = np.flatnonzero(~single), owners(grid).ravel(), grid.communicator.rank
+        own, members = grouped[owner[grouped] == rank], grouped[owner[home[grouped]] == rank]
+        number = grid.part(np.arange(home.size).reshape(whole.shape)).ravel()
+        self.at, self.total = np.searchsorted(number, own), total[own]
+        large, self._group = np.unique(home[members], return_inverse=True)
+        self._large, of_own, of_members = np.searchsorted(own, large), owner[home[own]], owner[members]
+        # own cells by the rank of their large cell, and all cells of groups whose large cell is here by their rank
+        self._away = {other: np.flatnonzero(of_own == other) for other in np.unique(of_own).tolist()}
+        self._held = {other: np.flatnonzero(of_members == other) for other in np.unique(of_members).tolist()}
+
+    def summed(self, values: Array) -> Array:
+        """Sums over groups of values of the cells `at` (m, n), in all of these."""
+        members = self._exchanged(values, self._away, self._held, len(self._group))
+        count = len(self._large)
+        return self._back(np.array([np.bincount(self._group, weights=field, minlength=count) for field in members]))
+
+    def copied(self, values: Array) -> Array:
+        """Values of the large cells of the cells `at`, of values of these (m, n)."""
+        return self._back(values[:, self._large])
+
+    def _back(self, of_groups: Array) -> Array:
+        """Values of groups whose large cell is here (m, groups), in the cells `at` of all ranks."""
+        return self._exchanged(of_groups[:, self._group], self._held, self._away, len(self.at))
+
+    def _exchanged(self, values: Array, outgoing: Columns, wanted: Columns, count: int) -> Array:
+        """Values (m, count) of which each rank has given some columns of its own, in the places that are wanted."""
+        result, rank = np.empty((len(values), count)), self._communicator.rank
+        sent = {other: values.take(columns, axis=1) for other, columns in outgoing.items()}
+        if rank in sent:
+            result[:, wanted[rank]] = sent.pop(rank)
+        got = {other: np.empty((len(values), len(columns))) for other, columns in wanted.items() if other != rank}
+        self._communicator.swap(sent, got)
+        for other, received in got.items():
+            result[:, wanted[other]] = received
+        return result
 
 
 class SingleCells:
@@ -96,28 +159,15 @@ class SingleCells:
 
 
 class CutGroups(SingleCells):
-    """The groups of a fluid with smooth walls.
-
-    total  open volume of the group of every cell, over that of a cell (nz, ny, nx)
-    """
+    """The groups of a fluid with smooth walls."""
 
     def __init__(self, fluid: FluidSolver) -> None:
         grid, cut = fluid.grid, fluid.boundaries.cut
         assert isinstance(cut, CutCells)
-        if grid.whole is not grid:
-            remedy = "take one process, or solid cells"
-            raise InputError("ranks", None, "1 for a temperature or a vapour within smooth walls", remedy)
         super().__init__(fluid)
-        self.volume = np.asarray(cut.own_volume() * fluid.open_cells)
-        small, home = large_cells(grid, self.volume)
-        total = np.bincount(home, weights=self.volume.ravel(), minlength=home.size)
-        beside = binary_dilation(grid.open, iterations=BEYOND) & small
-        flat = grid.inner(np.arange(cut.volume.size).reshape(grid.padded_shape)).ravel()
-        self._small = flat[beside.ravel()]
-        self._home = flat[home[beside.ravel()]]
-        merged = ~small.ravel() & (total != 1.0)
-        self._merged, self._inverse = flat[merged], 1.0 / total[merged]
-        self._all, self.total = home, total[home].reshape(grid.shape)
+        self._groups = Groups(grid, fluid.boundaries.periodic)
+        self.volume = self._groups.volume
+        self._at = grid.inner(np.arange(cut.volume.size).reshape(grid.padded_shape)).ravel()[self._groups.at]
         faces = [np.flatnonzero(cut.aperture[d] < 1.0) for d in range(3)]
         self._cut_faces = [(at, cut.aperture[d].ravel()[at]) for d, at in enumerate(faces)]
         self._allow_for(cut, fluid.inverse_spacing)
@@ -130,8 +180,10 @@ class CutGroups(SingleCells):
             low, high = [slice(None)] * 3, [slice(None)] * 3
             low[2 - d], high[2 - d] = slice(None, -1), slice(1, None)
             sums += faces[tuple(low)] + faces[tuple(high)]
-        of_groups = np.bincount(self._all, weights=sums.ravel(), minlength=sums.size)[self._all].reshape(sums.shape)
-        self.spread = np.maximum(self.spread, np.where(self.total == 1.0, 0.0, of_groups / self.total))
+        at, total = self._groups.at, self._groups.total
+        of_groups = self._groups.summed(sums.reshape(1, -1)[:, at])[0] / total
+        spread = self.spread.reshape(-1)
+        spread[at] = np.maximum(spread[at], np.where(total == 1.0, 0.0, of_groups))
 
     def shut(self, flux: Array) -> None:
         """See `SingleCells.shut`."""
@@ -140,35 +192,22 @@ class CutGroups(SingleCells):
 
     def gather(self, sums: Array) -> None:
         """See `SingleCells.gather`."""
-        gather(self._small, self._home, self._merged, self._inverse, sums)
+        flat = sums.reshape(-1)
+        flat[self._at] = self._groups.summed(flat[None, self._at])[0] / self._groups.total
 
     def copy(self, values: Array) -> None:
         """See `SingleCells.copy`."""
-        values.reshape(-1)[self._small] = values.reshape(-1)[self._home]
+        flat = values.reshape(-1)
+        flat[self._at] = self._groups.copied(flat[None, self._at])[0]
 
     def averaged(self, cells: Array) -> Array:
         """See `SingleCells.averaged`."""
-        sums = np.bincount(self._all, weights=(self.volume * cells).ravel(), minlength=cells.size)[self._all]
-        return np.asarray(sums.reshape(cells.shape) / self.total)
+        mean, at = np.array(cells, float), self._groups.at
+        flat = mean.reshape(-1)
+        flat[at] = self._groups.summed((self.volume * cells).reshape(1, -1)[:, at])[0] / self._groups.total
+        return mean
 
 
 def cell_groups(fluid: FluidSolver) -> SingleCells:
     """The groups of the cells of a fluid."""
     return CutGroups(fluid) if fluid.grid.walls else SingleCells(fluid)
-
-
-@serial
-def gather(small, home, merged, inverse, sums):
-    """Add the sums of small cells to those of their large ones, over the open volume, and copy these back.
-
-    small, home      flat indices of small cells and of their large ones
-    merged, inverse  large cells of groups that are not one whole cell, and one over their open volume
-    sums             padded
-    """
-    sums = sums.reshape(-1)
-    for n in range(len(small)):
-        sums[home[n]] += sums[small[n]]
-    for n in range(len(merged)):
-        sums[merged[n]] *= inverse[n]
-    for n in range(len(small)):
-        sums[small[n]] = sums[home[n]]

@@ -63,14 +63,14 @@ class ScalarWalls(InsulatedWalls):
         cut, grid = fluid.boundaries.cut, fluid.grid
         assert isinstance(cut, CutCells)
         share, distance, centre = _distances(cut, groups)
-        amount = np.linalg.norm(wall_area(cut), axis=0) / grid.cell_volume
+        amount = np.linalg.norm(wall_area(cut), axis=0) / grid.cell_volume  # local: components
         beside = groups.averaged(amount) > 0.0  # in any cell of the group
         here = np.flatnonzero(beside & (share > 0.0))
         flat = grid.inner(np.arange(cut.volume.size).reshape(grid.padded_shape)).ravel()
         self.at, self.amount, self.distance = flat[here], amount.ravel()[here], distance.ravel()[here]
         self.rule, self._volume = rule_of(wall, capacity), grid.cell_volume
         self._entered = np.zeros((2, here.size))
-        self._slope = np.zeros(cut.volume.size)
+        self._slope, self._fluid = np.zeros(cut.volume.shape), fluid
         self.faces = [_faces(fluid, d, beside, distance, centre) for d in range(3)]
         coefficient, in_series = self.rule[1], self.rule[5]
         per_group = groups.averaged(amount / np.maximum(share, 1e-300) * (share > 0.0))
@@ -82,19 +82,19 @@ class ScalarWalls(InsulatedWalls):
     def correct(self, value: Array, carried_by: Carried, stage: int) -> None:
         """See `InsulatedWalls.correct`."""
         diffusivity = carried_by.diffusivity
-        through_walls(
-            value, diffusivity, (self.at, self.amount, self.distance), self.rule, self._entered[stage], self._slope
-        )
+        slope, walls = self._slope.reshape(-1), (self.at, self.amount, self.distance)
+        through_walls(value, diffusivity, walls, self.rule, self._entered[stage], slope)
+        self._fluid.boundaries.halo.fill(self._slope, extend=False)
         for d, faces in enumerate(self.faces):
             through = carried_by.through[stage, d]
-            correct_gradients(value, self._slope, diffusivity, faces, carried_by.inverse[d], through)
+            correct_gradients(value, slope, diffusivity, faces, carried_by.inverse[d], through)
 
     def give(self, stage: int, step: float, left: Array) -> None:
         """See `InsulatedWalls.give`."""
-        mean = self._entered.mean(axis=0) if stage else self._entered[0]
+        mean = 0.5 * (self._entered[0] + self._entered[1]) if stage else self._entered[0]
         left.reshape(-1)[self.at] -= mean
         if stage:
-            self.supplied = step * float(mean.sum()) * self._volume
+            self.supplied = step * float(self._fluid.communicator.sum(mean)) * self._volume
 
 
 def scalar_walls(fluid: FluidSolver, groups: Any, wall: Wall | None, capacity: float) -> InsulatedWalls:

@@ -39,10 +39,6 @@ def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None
     for table in case.feature_tables:
         if ranks > 1 and table.one_process:
             raise InputError(table.table, None, "left out in a run of several processes", "take one process")
-    if ranks > 1 and case.has_smooth_walls:
-        key = "vessel" if case.vessel else "wall"
-        limit = "left out" if case.vessel else "without a thin one"
-        raise InputError(key, None, f"{limit} in a run of a fluid on several processes", "take one process")
     if ranks > 1 and case.fluid:
         divide(grid_of(case), ranks, shape=shape)
 

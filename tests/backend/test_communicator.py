@@ -44,14 +44,12 @@ LOCAL_FILES = {
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
     "fluid/cut_cells.py": "every rank knows the smooth walls of the whole box",
-    "fluid/cell_groups.py": "for one process alone",
-    "fluid/scalar_walls.py": "for one process alone",
+    "fluid/cell_groups.py": "every rank knows the groups of the whole box",
     "fluid/near_walls.py": "along axes and neighbours of one cell",
     "fluid/surfaces.py": "every rank knows the smooth walls of the whole box",
     "fluid/triangles.py": "every rank knows the smooth walls of the whole box",
     "fluid/thin_walls.py": "every rank knows the walls of the whole box",
     "fluid/wall_force.py": "along the axes of one cell",
-    "coupling/merged_cells.py": "for one process alone",
 }
 """Files and folders that reduce only arrays that every rank knows whole: the input of a run, and what is made before it
 starts."""

@@ -18,7 +18,6 @@ from cfddem.particles.state import make_particles
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.preflight.summary import preflight
 from cfddem.run.build import boundaries_of, walls_of
-from cfddem.run.division import require_parallel
 
 TUBE = {"shape": "cylinder", "point": [0.08, 0.08, 0.02], "radius": 0.026, "length": 0.08, "solid": "thin"}
 PLATE = {"shape": "plate", "point": [0.0, 0.083, 0.1], "edges": [[0.16, 0.0, 0.0], [0.0, 0.0, 0.05]]}
@@ -102,8 +101,6 @@ def test_the_check_says_how_large_a_tube_is_for_the_fluid():
         assert row.value == pytest.approx(cells * 1e-4 / (np.pi * radius**2))
 
 
-def test_a_narrow_tube_is_warned_of_and_several_processes_are_refused():
+def test_a_narrow_tube_is_warned_of():
     found = [each for each in preflight(made({**TUBE, "radius": 0.015})).issues if each.key == "wall.0.radius"]
     assert [each.severity for each in found] == ["warning"] and "3 cells across the opening" in found[0].reason
-    with pytest.raises(InputError, match=r"vessel.*one process"):
-        require_parallel(made(TUBE), 2)

@@ -197,9 +197,11 @@ def test_what_a_vessel_and_its_patches_cannot_have_is_refused_in_a_line(given, s
     assert len(str(refusal.value)) < 400
 
 
-def test_several_processes_are_refused():
-    with pytest.raises(InputError, match=r"vessel.*one process"):
-        require_parallel(made(), 2)
+def test_processes_share_a_vessel_by_its_layers_of_cells():
+    """16 x 16 x 24 cells, at least three layers each."""
+    require_parallel(made(), 200)
+    with pytest.raises(InputError, match=r"ranks.*at most 5 x 5 x 8 for 16 x 16 x 24 cells"):
+        require_parallel(made(), 201)
 
 
 # ---------------------------------------------------------------- patches
