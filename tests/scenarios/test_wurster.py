@@ -62,5 +62,8 @@ def test_the_spray_lies_in_the_tube_and_coating_counts_who_passes_it():
     assert found.variation == pytest.approx(np.sqrt(1.25) / 1.5)
 
 
-def test_the_check_has_no_warning():
-    assert not [each for each in preflight(gallery()["wurster"]).issues if each.severity != "note"]
+def test_the_air_can_carry_the_spray_and_the_check_warns_of_large_pellets_alone():
+    found = preflight(gallery()["wurster"])
+    rows = {row.name: row.value for row in found.rows}
+    assert rows["water sprayed / carried"] == pytest.approx(0.42, abs=0.01)
+    assert [each.key for each in found.issues if each.severity != "note"] == ["heat.solid_conductivity.pellet"]

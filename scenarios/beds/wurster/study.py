@@ -131,26 +131,28 @@ def coating(run: RunData, case: Case) -> Coating:
 
 
 def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None:
-    """Pellets near the middle plane at some times, coloured by their liquid, the mean velocity of the air, the
-    circulation, and how many pellets carry how much."""
-    ratios = [*[1.0] * (len(times) + 1), 1.6, 1.6]
-    drawn, axes = panels(len(times) + 3, width=11.0, height=3.4, width_ratios=ratios)
+    """Pellets near the middle plane at some times, coloured by their liquid, mean velocity and temperature of the air,
+    the circulation, and how many pellets carry how much."""
+    ratios = [*[1.0] * (len(times) + 2), 1.6, 1.6]
+    drawn, axes = panels(len(times) + 4, width=12.5, height=3.4, width_ratios=ratios)
     for axis, time in zip(axes, times):
         shown, balls = draw_spheres(axis, run, case, time, reach=0.75, size=9.0, most=MOST, by="liquid")
         axis.set_title(f"{shown:.2f} s", fontsize=9.5)
-    *_, flow, curve, histogram = axes
+    *_, flow, heat, curve, histogram = axes
     bar = drawn.colorbar(balls, ax=axes[len(times) - 1], shrink=0.7, pad=0.04, extend="max")
     bar.ax.set_title("mm3", fontsize=9.5)
     late = [n for n, time in enumerate(run.times) if time > 0.5 * run.times[-1]]
     velocity = np.mean([run.fluid("velocity", n)[..., 2] for n in late], axis=0)
-    rows = slice(velocity.shape[1] // 2 - 1, velocity.shape[1] // 2 + 1)
-    air = flow.imshow(
-        velocity[:, rows].mean(axis=1), origin="lower", cmap="viridis", vmin=0.0,
-        extent=(0.0, case.column.width, 0.0, case.column.height),
-    )  # fmt: skip
-    flow.grid(False)
-    drawn.colorbar(air, ax=flow, shrink=0.7, pad=0.04)
-    flow.set_title("air, upward  [m/s]", fontsize=9.5)
+    celsius = np.mean([run.fluid("temperature", n) for n in late], axis=0) - 273.15
+    for axis, values, least, title in ((flow, velocity, 0.0, "air, upward  [m/s]"), (heat, celsius, None, "air  [°C]")):
+        rows = slice(values.shape[1] // 2 - 1, values.shape[1] // 2 + 1)
+        air = axis.imshow(
+            values[:, rows].mean(axis=1), origin="lower", cmap="plasma" if axis is heat else "viridis", vmin=least,
+            extent=(0.0, case.column.width, 0.0, case.column.height),
+        )  # fmt: skip
+        axis.grid(False)
+        drawn.colorbar(air, ax=axis, shrink=0.7, pad=0.04)
+        axis.set_title(title, fontsize=9.5)
     tube = tube_of(case)
     ends = [tube.point[2], tube.point[2] + (tube.length or 0.0)]
     for axis in axes[:-2]:
