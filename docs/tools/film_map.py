@@ -11,7 +11,7 @@ import math
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +21,15 @@ sys.path[:0] = [str(ROOT)] * (str(ROOT) not in sys.path)
 
 from scenarios.validation.film_map import effects  # noqa: E402
 from scenarios.validation.film_map.design import (  # noqa: E402
-    DENSITY_RATIOS,
+    CORNERS,
+    DRY,
     SEEDS,
     SOLID_FRACTIONS,
-    STOKES,
+    STILL,
     Point,
     Run,
     is_corner,
+    is_end,
     plan,
 )
 from scenarios.validation.film_map.effects import Beds, Estimate  # noqa: E402
@@ -36,6 +38,8 @@ LIST = ROOT / "scenarios" / "README.md"
 DATA = ROOT / "docs" / "tables" / "film-map.csv"
 PAGE = ROOT / "scenarios" / "validation" / "film_map" / "README.md"
 BEGIN, END = "<!-- from the data: begin -->", "<!-- from the data: end -->"
+
+AGITATED = STILL._replace(agitated=True)
 
 Pair = tuple[Point, str]
 COLUMNS: dict[str, tuple[str, float, bool]] = {
@@ -87,14 +91,13 @@ def page_of(beds: Beds) -> str:
 
 
 def is_known(beds: Beds) -> bool:
-    """Whether the coarse design has run with two seeds: fewer beds say nothing about the map."""
-    return set(coarse()) <= set(beds)
+    """Whether the first part has run with one seed: fewer beds say nothing about the map."""
+    return set(needed()) <= set(beds)
 
 
-def coarse() -> list[Run]:
-    """Beds of the coarse design with two seeds."""
-    return [each for each in plan() if is_corner(each.point) and not each.point.agitated
-            and each.seed in SEEDS[:2] and each.film != "soft"]  # fmt: skip
+def needed() -> list[Run]:
+    """Beds at the lowest and highest Stokes numbers with one seed."""
+    return [each for each in plan() if is_end(each.point) and each.seed == SEEDS[0] and each.film != "soft"]
 
 
 # ---------------------------------------------------------------- numbers
@@ -132,6 +135,8 @@ def mean_of(beds: Beds, pairs: Iterable[Pair], what: str) -> Estimate | None:
 def clear(beds: Beds, pairs: Sequence[Pair], what: str) -> str:
     """How many changes are up and down by more than two of their errors."""
     known = [each for pair in pairs if (each := of_pair(beds, pair, what)) is not None and not math.isnan(each.error)]
+    if not known:
+        return "errors are not known yet"
     up, down = (sum(way * each.value > 2.0 * each.error for each in known) for way in (1.0, -1.0))
     return f"up in {up} and down in {down} of {len(known)} beds by more than two errors"
 
@@ -154,32 +159,32 @@ def values(beds: Beds, pairs: Iterable[Pair], what: str) -> list[float]:
 
 
 def headline(beds: Beds) -> str:
-    """The main result: how the effect of films of smooth and rough spheres changes with the Stokes number."""
+    """The main result: what films of smooth and rough spheres change at the lowest and at the highest Stokes number."""
     if not is_known(beds):
-        return f"The map has not been computed yet: {len(coarse())} beds make its coarse design."
-    pairs, levels = even(beds), STOKES
-    ends = [[pair for pair in pairs if pair[0].stokes == level] for level in (levels[0], levels[-1])]
-    collisions, height = (
-        [f"{COLUMNS[what][1] * found.value:+.{places}f}" for each in ends if (found := mean_of(beds, each, what))]
-        for what, places in (("collisions", 0), ("bed_height", 2))
-    )
+        return f"The map has not been computed yet: {len(needed())} beds make its first part."
     asked = list(plan())
     part = "" if len(beds) == len(asked) else f" ({len(beds)} of {len(asked)} beds so far)"
-    numbers = " and ".join(f"{each:g}" for each in (levels[0], levels[-1]))
+    stokes, collisions, temperature, height = (
+        [f"{COLUMNS[what][1] * found.value:{form}}" for each in ends(beds) if (found := mean_of(beds, each, what))]
+        for what, form in (
+            ("stokes", ".3g"), ("collisions", "+.0f"), ("granular_temperature", "+.0f"), ("bed_height", "+.2f")
+        )
+    )  # fmt: skip
     return (
-        f"At terminal Stokes numbers of {numbers}, films change the collision rate by "
-        f"{' and '.join(collisions)} %, and the bed height by "
-        f"{' and '.join(height)} %{part}."
+        f"In agitated beds with median Stokes numbers of {' and '.join(stokes)}, films change the collision rate by "
+        f"{' and '.join(collisions)} %, the granular temperature by {' and '.join(temperature)} %, and the bed height "
+        f"by {' and '.join(height)} %{part}."
     )
 
 
-def even(beds: Beds) -> list[Pair]:
-    """Beds of the coarse design without agitation, of smooth and rough spheres."""
-    return [
-        (point, film)
-        for point, film in effects.compared(beds)
-        if is_corner(point) and not point.agitated and film != "soft"
-    ]
+def hard(beds: Beds) -> list[Pair]:
+    """Beds of the coarse design, of smooth and rough spheres."""
+    return [(point, film) for point, film in effects.compared(beds) if is_corner(point) and film != "soft"]
+
+
+def ends(beds: Beds) -> list[list[Pair]]:
+    """Those at the lowest and at the highest Stokes number of the superficial velocity."""
+    return [[pair for pair in hard(beds) if is_end(pair[0]) and pair[0].reynolds == level] for level in CORNERS[0]]
 
 
 def sections(beds: Beds) -> Iterator[str]:
@@ -193,35 +198,34 @@ def sections(beds: Beds) -> Iterator[str]:
     )
     yield "### Means over the map"
     yield wrapped(
-        "Smooth and rough spheres of the coarse design without agitation, and the other groups beside them. Changes "
+        "Smooth and rough spheres of the coarse design, and soft ones and a bed without agitation beside them. Changes "
         "are relative to the bed without films. The errors are those by the seeds."
     )
-    groups = [pair for pair in pairs if is_corner(pair[0])]
-    yield table(beds, "beds", list(_groups(groups)))
+    yield table(beds, "beds", list(_groups(beds)))
+    moved, still = (effects.mean(beds, point, DRY, "granular_temperature") for point in (AGITATED, STILL))
+    if moved is not None and still is not None:
+        yield wrapped(
+            f"Without agitation and films, the bed of the last two rows has a granular temperature of "
+            f"{shown(still, 1e6, False)} mm2/s2, with agitation {shown(moved, 1e6, False)}."
+        )
     yield "### What the papers say, and what the map says"
-    yield "\n".join(["| paper | statement | the map |", "|:--|:--|:--|", *_statements(beds, groups)])
+    yield "\n".join(["| paper | statement | the map |", "|:--|:--|:--|", *_statements(beds)])
     yield "### All beds"
     yield table(beds, "bed", [(f"{_named(point)}, {film}", [(point, film)]) for point, film in pairs])
 
 
-def _groups(pairs: Sequence[Pair]) -> Iterator[tuple[str, list[Pair]]]:
-    """Groups of beds of the coarse design: by each number of the design, by film, and with agitation."""
-
-    def take(keep: Callable[[Point, str], bool]) -> list[Pair]:
-        return [(point, film) for point, film in pairs if keep(point, film)]
-
-    hard = take(lambda point, film: not point.agitated and film != "soft")
-    for level in STOKES:
-        yield f"St = {level:g}", [pair for pair in hard if pair[0].stokes == level]
+def _groups(beds: Beds) -> Iterator[tuple[str, list[Pair]]]:
+    """Groups of beds of the coarse design, by Stokes number, solid fraction and film, and those without agitation."""
+    for point in sorted({pair[0]._replace(solid_fraction=0.0) for pair in hard(beds)}, key=lambda each: each.stokes):
+        name = f"$St_U$ = {point.stokes:.3g}: $Re_m$ {point.reynolds:g}, density ratio {point.density_ratio:g}"
+        yield name, [pair for pair in hard(beds) if pair[0]._replace(solid_fraction=0.0) == point]
     for level in SOLID_FRACTIONS:
-        yield f"solid fraction {level:g}", [pair for pair in hard if pair[0].solid_fraction == level]
-    for level in DENSITY_RATIOS:
-        yield f"density ratio {level:g}", [pair for pair in hard if pair[0].density_ratio == level]
+        yield f"solid fraction {level:g}", [pair for pair in hard(beds) if pair[0].solid_fraction == level]
+    pairs = effects.compared(beds)
     for film in effects.ROUGHNESS:
-        yield f"{film} spheres", take(lambda point, each, film=film: not point.agitated and each == film)
-    yield "with agitation, smooth and rough", take(lambda point, film: point.agitated and film != "soft")
-    twins = {point._replace(agitated=False) for point, _ in pairs if point.agitated}
-    yield "the same without agitation", [pair for pair in hard if pair[0] in twins]
+        yield f"{film} spheres", [pair for pair in pairs if is_corner(pair[0]) and pair[1] == film]
+    yield "one bed without agitation", [pair for pair in pairs if pair[0] == STILL]
+    yield "the same with agitation", [pair for pair in hard(beds) if pair[0] == AGITATED]
 
 
 def table(beds: Beds, first: str, rows: Sequence[tuple[str, list[Pair]]]) -> str:
@@ -235,17 +239,14 @@ def table(beds: Beds, first: str, rows: Sequence[tuple[str, list[Pair]]]) -> str
 
 
 def _named(point: Point) -> str:
-    words = f"St {point.stokes:g}, {point.solid_fraction:g} solids, ratio {point.density_ratio:g}"
-    return f"{words}, agitated" if point.agitated else words
+    words = f"$Re_m$ {point.reynolds:g}, {point.solid_fraction:g} solids, ratio {point.density_ratio:g}"
+    return words if point.agitated else f"{words}, without agitation"
 
 
-def _statements(beds: Beds, pairs: Sequence[Pair]) -> Iterator[str]:
-    """Statements of the papers beside the numbers of the map."""
-    hard = [pair for pair in pairs if pair[1] != "soft"]
-    still = [pair for pair in hard if not pair[0].agitated]
-    low = [pair for pair in still if pair[0].stokes == min(STOKES)]
-    high = [pair for pair in still if pair[0].stokes == max(STOKES)]
-    rough, smooth = ([pair for pair in still if pair[1] == film] for film in ("rough", "smooth"))
+def _statements(beds: Beds) -> Iterator[str]:
+    """Statements of the papers beside the numbers of the coarse design."""
+    pairs, (low, high) = hard(beds), ends(beds)
+    rough, smooth = ([pair for pair in pairs if pair[1] == film] for film in ("rough", "smooth"))
     nijssen, davis, singh = "Nijssen et al. (2023)", "Davis (2023)", "Singh et al. (2026)"
     yield (
         f"| {nijssen} | films significantly influence liquid beds; experiments find that they raise or lower the bed | "
@@ -256,7 +257,7 @@ def _statements(beds: Beds, pairs: Sequence[Pair]) -> Iterator[str]:
         f"| Liu et al. (2017), cited there | films lower the expansion and the granular temperature | granular "
         f"temperature changes by {between(temperature)}: {clear(beds, pairs, 'granular_temperature')} |"
     )
-    along, across = (_changes(beds, still, f"temperature_{way}") for way in ("along", "across"))
+    along, across = (_changes(beds, pairs, f"temperature_{way}") for way in ("along", "across"))
     yield (
         "| Campos et al. (2021), Wang et al. (2012), cited there | films make the bed less, or more, homogeneous | "
         f"these beds are too low for layers; the motion along gravity, in which waves are, changes by "
@@ -289,7 +290,7 @@ def _statements(beds: Beds, pairs: Sequence[Pair]) -> Iterator[str]:
         "bed, drag the rest; films on the map act along the line of centres alone |"
     )
     yield (
-        f"| {singh} | most models take the Stokes number alone, yet a second number matters | {_spread(beds, still)} |"
+        f"| {singh} | most models take the Stokes number alone, yet a second number matters | {_spread(beds, pairs)} |"
     )
 
 
@@ -314,7 +315,7 @@ def _spread(beds: Beds, pairs: Sequence[Pair]) -> str:
     share = 1.0 - float(np.var(left) / np.var(y))
     return (
         f"a line in the logarithm of the median St explains {100.0 * share:.0f} % of the variance of the change of the "
-        f"collision rate over {len(found)} beds; {100.0 * float(np.std(left)):.0f} % are left as standard deviation"
+        f"collision rate over {len(found)} beds; a standard deviation of {100.0 * float(np.std(left)):.0f} % is left"
     )
 
 

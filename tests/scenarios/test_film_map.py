@@ -11,8 +11,9 @@ import pytest
 from command_line import HOME
 
 from cfddem.analysis.bed_laws import expansion_laws
-from cfddem.preflight.expansion import expansion_exponents
 from cfddem.preflight.summary import preflight
+from closures.agitation import free_spheres
+from closures.registry import law_of
 from scenarios.validation.film_map import study
 from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, is_corner, plan, points, stokes_of
 from scenarios.validation.film_map.effects import Beds, Estimate, change, compared, mean, read_beds, write_beds
@@ -27,22 +28,29 @@ import film_map as page
     [pytest.param(point, id=point.name, marks=[pytest.mark.slow] * (n % 4 > 0)) for n, point in enumerate(points())],
 )
 def test_beds_have_the_numbers_of_the_design(point: Point) -> None:
-    """Stokes number of terminal velocity, solid fraction by Richardson and Zaki, density ratio; a warning of waves."""
+    """Reynolds number and solid fraction by Richardson and Zaki, density ratio; all within the range of agitation."""
+    for name, (lowest, highest) in law_of(free_spheres).ranges.items():
+        assert lowest < getattr(point, name) <= highest
     for film in (DRY, *ROUGHNESS):
         case = bed(point, film, 2)
-        terminal = expansion_exponents(case)["Richardson-Zaki"][1]
-        assert stokes_of(case, terminal) == pytest.approx(point.stokes, rel=1e-6)
+        velocity = case.bed.inlet_velocity
+        assert isinstance(velocity, float) and isinstance(case.required_fluid.viscosity, float)
+        reynolds = case.required_fluid.density * velocity * case.bed.diameter / case.required_fluid.viscosity
+        assert reynolds == pytest.approx(point.reynolds, rel=1e-6)
+        assert stokes_of(case, velocity) == pytest.approx(point.stokes, rel=1e-6)
         assert expansion_laws(case)["Richardson-Zaki"] == pytest.approx(1.0 - point.solid_fraction, rel=1e-6)
         assert case.solid.density / case.required_fluid.density == pytest.approx(point.density_ratio)
         assert case.has_films == (film != DRY) and case.bed.seed == 2
         assert (case.agitation != "none") == point.agitated
         said = preflight(case)
         assert said.status != "error"
-        assert {each.key for each in said.issues if each.severity == "warning"} <= {"laws.agitation"}, "waves alone"
+        assert {each.key for each in said.issues if each.severity == "warning"} == set(
+            () if point.agitated else ("laws.agitation",)
+        ), "of waves, without agitation"
 
 
 def test_beds_with_and_without_films_differ_in_the_film_alone() -> None:
-    point = Point(100.0, 0.45, 2.5)
+    point = Point(60.0, 0.42, 2.5)
     dry, rough = (bed(point, film, 1) for film in (DRY, "rough"))
     changed = {"title": dry.title, "laws.lubrication": "none", "material.sphere.roughness": ROUGHNESS["smooth"]}
     assert rough.with_(**changed) == dry
@@ -51,9 +59,10 @@ def test_beds_with_and_without_films_differ_in_the_film_alone() -> None:
 def test_the_coarse_design_is_complete_first_with_two_seeds() -> None:
     asked = list(plan())
     assert len(asked) == len(set(asked)) == len({run.name for run in asked})
-    corners = {point for point in points() if is_corner(point) and not point.agitated}
-    assert len(corners) == 12
-    first = set(asked[: 12 * 3 * 2])
+    corners = {point for point in points() if is_corner(point)}
+    assert len(corners) == 8
+    assert sorted({run.point.stokes for run in asked[: 4 * 3 * 2]}) == pytest.approx([10.0, 560.0 / 3.0])
+    first = set(asked[: 8 * 3 * 2])
     assert first == {
         Run(point, film, seed) for point in corners for film in (DRY, "smooth", "rough") for seed in (1, 2)
     }
@@ -64,7 +73,7 @@ def test_the_coarse_design_is_complete_first_with_two_seeds() -> None:
 def made_up() -> Beds:
     """Means of two points from two seeds, one film of which has one seed alone."""
     beds: Beds = {}
-    for point in (Point(20.0, 0.25, 2.5), Point(500.0, 0.45, 7.0)):
+    for point in (Point(30.0, 0.25, 1.5), Point(120.0, 0.42, 7.0)):
         for seed in (1, 2):
             for number, film in enumerate((DRY, "smooth", "rough")):
                 if (film, seed) != ("rough", 2):
@@ -80,7 +89,7 @@ def made_up() -> Beds:
 
 def test_changes_are_taken_seed_by_seed() -> None:
     """Heights of 20.1 and 20.2 mm beside 20 mm: 0.5 and 1 %; a film with one seed has no error."""
-    beds, (point, other) = made_up(), (Point(20.0, 0.25, 2.5), Point(500.0, 0.45, 7.0))
+    beds, (point, other) = made_up(), (Point(30.0, 0.25, 1.5), Point(120.0, 0.42, 7.0))
     found = change(beds, point, "smooth", "bed_height")
     assert found == pytest.approx(Estimate(0.0075, 0.0025, 2))
     assert change(beds, point, "smooth", "collisions") == Estimate(-0.25, 0.0, 2)
@@ -105,9 +114,9 @@ def test_the_file_of_the_beds_can_be_read_back_and_drawn(tmp_path: Path) -> None
 def test_the_table_has_changes_with_errors_and_the_balance_of_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     beds = {run: means | {"largest_remainder": 2e-3 if run.seed == 2 else 1e-4} for run, means in made_up().items()}
     found = {row.quantity: row for row in study.rows(beds)}
-    height = found["St20-phi0.25-ratio2.5, smooth: bed height, relative change by films"]
+    height = found["Re30-phi0.25-ratio1.5, smooth: bed height, relative change by films"]
     assert height.value == pytest.approx(0.0075) and height.note == "standard error 0.0025 over 2 seeds"
-    assert found["St20-phi0.25-ratio2.5, rough: bed height, relative change by films"].note == "one seed"
+    assert found["Re30-phi0.25-ratio1.5, rough: bed height, relative change by films"].note == "one seed"
     (balance,) = [row for row in found.values() if row.limit is not None]
     assert balance.value == 2e-3 and balance.verdict == "FAILS"
 
@@ -119,12 +128,12 @@ def test_the_page_says_what_its_data_say() -> None:
 
 def test_a_map_of_few_beds_says_nothing() -> None:
     text = page.page_of(made_up())
-    assert "72 beds make its coarse design" in text and "| St = 20 |" not in text
+    assert "12 beds make its first part" in text and "| $St_U$ = 10:" not in text
 
 
 def test_statements_of_the_page_follow_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
     assert doctest.testmod(page).failed == 0
     monkeypatch.setattr(page, "is_known", lambda beds: True)
     text = page.page_of(made_up())
-    assert "10 of 327 beds have run" in text and "| St = 20 |" in text
+    assert "10 of 273 beds have run" in text and "| $St_U$ = 10:" in text
     assert "| +0.75 ± 0.25 |" in text and "up in 2 and down in 0 of 2 beds" in text

@@ -13,13 +13,11 @@ from scipy.optimize import brentq
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.expansion import expansion_exponents
-from closures.agitation import free_spheres
-from closures.registry import law_of
 
-STOKES = (20.0, 100.0, 500.0)
-"""Stokes numbers at the terminal velocity of a single sphere; those of the collisions are 20 to 60 times smaller."""
+REYNOLDS = (30.0, 60.0, 120.0)
+"""Re_m, of the superficial velocity: that of the mean slip in a uniform bed. Agitation was measured from 25 to 130."""
 
-SOLID_FRACTIONS = (0.25, 0.35, 0.45)
+SOLID_FRACTIONS = (0.25, 0.33, 0.42)
 """By Richardson and Zaki; they set the velocity of each bed."""
 
 DENSITY_RATIOS = (1.5, 2.5, 7.0)
@@ -36,37 +34,40 @@ DRY = "no film"
 SPHERES = 440
 """The lowest beds are four cells high."""
 
-CORNERS = {"solid_fraction": (0.25, 0.45), "density_ratio": (2.5, 7.0)}
-"""Levels of the coarse design, which runs first; it has all Stokes numbers."""
+CORNERS = tuple((levels[0], levels[-1]) for levels in (REYNOLDS, SOLID_FRACTIONS, DENSITY_RATIOS))
+"""Levels of the coarse design, which runs first: the outer two of each number."""
 
 SEEDS = (1, 2, 3)
 
-TURNOVERS, SETTLED = 4.0, 1.5
+TURNOVERS, SETTLED = 3.0, 1.0
 """End of a run and start of its averages, over the time in which the flow rises through the bed, H/U."""
 
 ROOM = 1.6
 """Height of the column over that of the bed by Richardson and Zaki, at least."""
 
-REFERENCE_SPEED = 0.64
-"""Speed of the fastest collisions over the superficial velocity."""
-
-REFERENCE_VELOCITY = 0.0785
-"""Superficial velocity for which the softened contact of the gallery case, 0.1 MPa, was chosen [m/s]."""
-
 
 class Point(NamedTuple):
     """The dimensionless numbers of a bed."""
 
-    stokes: float
+    reynolds: float
     solid_fraction: float
     density_ratio: float
-    agitated: bool = False
+    agitated: bool = True
+
+    @property
+    def stokes(self) -> float:
+        """Stokes number of a pair of spheres at the superficial velocity."""
+        return 2.0 / 9.0 * self.density_ratio * self.reynolds
 
     @property
     def name(self) -> str:
         """Name for folders."""
-        words = f"St{self.stokes:g}-phi{self.solid_fraction:g}-ratio{self.density_ratio:g}"
-        return f"{words}-agitated" if self.agitated else words
+        words = f"Re{self.reynolds:g}-phi{self.solid_fraction:g}-ratio{self.density_ratio:g}"
+        return words if self.agitated else f"{words}-without_agitation"
+
+
+STILL = Point(120.0, 0.25, 7.0, agitated=False)
+"""The bed that runs without agitation, too."""
 
 
 class Run(NamedTuple):
@@ -83,35 +84,33 @@ class Run(NamedTuple):
 
 
 def points() -> list[Point]:
-    """All points: without agitation, then those within the range of agitation with it."""
-    even = [Point(*values) for values in itertools.product(STOKES, SOLID_FRACTIONS, DENSITY_RATIOS)]
-    return even + [point._replace(agitated=True) for point in even if is_corner(point) and is_in_range(point)]
+    """All points: those with agitation, and the one without."""
+    return [*(Point(*values) for values in itertools.product(REYNOLDS, SOLID_FRACTIONS, DENSITY_RATIOS)), STILL]
 
 
 def is_corner(point: Point) -> bool:
     """Whether a point belongs to the coarse design."""
-    return all(getattr(point, name) in levels for name, levels in CORNERS.items())
+    return point.agitated and all(number in levels for number, levels in zip(point, CORNERS))
 
 
-@cache
-def is_in_range(point: Point) -> bool:
-    """Whether agitation was measured at the Reynolds number of a point."""
-    lowest, highest = law_of(free_spheres).ranges["reynolds"]
-    return bool(lowest <= reynolds(bed(point, DRY, SEEDS[0])) <= highest)
+def is_end(point: Point) -> bool:
+    """Whether its Stokes number at the superficial velocity is the lowest or the highest of the coarse design."""
+    return is_corner(point) and (point.reynolds == REYNOLDS[0]) == (point.density_ratio == DENSITY_RATIOS[0])
 
 
 def plan() -> Iterator[Run]:
     """All runs, in the order in which they begin: a table is complete, and then finer, after each part.
 
-    The coarse design with two seeds, its agitated beds, the third seed, soft spheres, all other points.
+    The coarse design with two seeds, its lowest and highest Stokes numbers first, the bed without agitation, the third
+    seed, soft spheres, all other points.
     """
     corners = [point for point in points() if is_corner(point)]
-    even, agitated = ([corner for corner in corners if corner.agitated == moved] for moved in (False, True))
-    others = [point for point in points() if not is_corner(point)]
+    others = [point for point in points() if not is_corner(point) and point.agitated]
     first = (DRY, "smooth", "rough")
     for chosen, films, seeds in (
-        (even, first, SEEDS[:2]),
-        (agitated, first, SEEDS[:2]),
+        ([point for point in corners if is_end(point)], first, SEEDS[:2]),
+        ([point for point in corners if not is_end(point)], first, SEEDS[:2]),
+        ([STILL], first, SEEDS[:2]),
         (corners, first, SEEDS[2:]),
         (corners, ("soft",), SEEDS),
         (others, first, SEEDS),
@@ -131,19 +130,17 @@ def bed(point: Point, film: str, seed: int) -> Case:
 
     The contacts are softened so that spheres overlap as little in all beds, by their weight and by their collisions.
     """
-    case = _of_liquid(point.density_ratio, viscosity(point.stokes, point.density_ratio))
-    exponent, terminal = expansion_exponents(case)["Richardson-Zaki"]
-    velocity = terminal * (1.0 - point.solid_fraction) ** exponent
+    case, velocity = _liquid(point)
     height = (
         case.particle_count * math.pi / 6.0 * case.bed.diameter**3 / (case.column.floor_area * point.solid_fraction)
     )
     end, reference = TURNOVERS * height / velocity, reference_bed()
-    faster = (velocity / REFERENCE_VELOCITY) ** 2
+    modulus, cell, slower = reference.solid.contact_modulus, case.column.cell, reference.bed.inlet_velocity
+    assert modulus is not None and isinstance(cell, float) and isinstance(slower, float)
+    faster = velocity / slower
     solid, liquid = reference.solid.density, reference.required_fluid.density
     heavier = (point.density_ratio - 1.0) * liquid / (solid - liquid)
-    modulus, cell = reference.solid.contact_modulus, case.column.cell
-    assert modulus is not None and isinstance(cell, float)
-    softened = modulus * max(heavier, point.density_ratio * liquid / solid * faster)
+    softened = modulus * max(heavier, point.density_ratio * liquid / solid * faster**2)
     return case.with_(**{
         "title": f"Bed of the map of films: {point.name}, {film}",
         "bed.inlet_velocity": velocity,
@@ -153,26 +150,14 @@ def bed(point: Point, film: str, seed: int) -> Case:
         "material.sphere.youngs_modulus": SOFT * softened if film == "soft" else case.solid.youngs_modulus,
         "laws.lubrication": "none" if film == DRY else case.laws.lubrication,
         "laws.agitation": "free_spheres" if point.agitated else "none",
-        "laws.surface": "smeared",
         "column.height": cell * math.ceil(ROOM * height / cell),
         "run.until": end,
         "run.average_from": SETTLED * height / velocity,
         "run.every": end / 4.0,
         "run.history_every": end / 160.0,
-        "run.reference_speed": REFERENCE_SPEED * velocity,
+        "run.reference_speed": reference.reference_speed * faster,
         "run.energy_budget": True,
     })  # fmt: skip
-
-
-@cache
-def viscosity(stokes: float, density_ratio: float) -> float:
-    """Viscosity at which a single sphere that falls has a Stokes number [Pa s]."""
-
-    def excess(logarithm: float) -> float:
-        case = _of_liquid(density_ratio, math.exp(logarithm))
-        return math.log(stokes_of(case, expansion_exponents(case)["Richardson-Zaki"][1]) / stokes)
-
-    return math.exp(brentq(excess, math.log(1e-5), math.log(1.0), xtol=1e-9))
 
 
 def stokes_of(case: Case, speed: float) -> float:
@@ -192,14 +177,18 @@ def viscosity_of(case: Case) -> float:
     return viscosity
 
 
-def reynolds(case: Case) -> float:
-    """Re_m of a uniform bed: the solid fraction and its mean slip make it that of the superficial velocity."""
-    assert isinstance(case.bed.inlet_velocity, float)
-    return case.required_fluid.density * case.bed.inlet_velocity * case.bed.diameter / viscosity_of(case)
+@cache
+def _liquid(point: Point) -> tuple[Case, float]:
+    """Spheres in the liquid in which they have their numbers, and the superficial velocity [m/s]."""
 
+    def tried(logarithm: float) -> tuple[Case, float]:
+        density = point.density_ratio * reference_bed().required_fluid.density
+        changes = {"material.sphere.density": density, "fluid.viscosity": math.exp(logarithm)}
+        case = reference_bed().with_(**{"bed.count": SPHERES, **changes})
+        exponent, terminal = expansion_exponents(case)["Richardson-Zaki"]
+        return case, terminal * (1.0 - point.solid_fraction) ** exponent
 
-def _of_liquid(density_ratio: float, viscosity: float) -> Case:
-    case = reference_bed()
-    density = density_ratio * case.required_fluid.density
-    changes = {"bed.count": SPHERES, "material.sphere.density": density, "fluid.viscosity": viscosity}
-    return case.with_(**changes)
+    def excess(logarithm: float) -> float:
+        return math.log(stokes_of(*tried(logarithm)) / point.stokes)
+
+    return tried(brentq(excess, math.log(1e-5), math.log(1.0), xtol=1e-9))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, plan, reynolds, viscosity_of
+from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, plan, viscosity_of
 from scenarios.validation.table import replacing
 
 Means = Mapping[str, float]
@@ -87,7 +87,7 @@ def compared(beds: Beds) -> list[tuple[Point, str]]:
     """Points and films of which some seed has both beds, in the order of the design."""
     pairs = {(run.point, run.film) for run in beds if run.film != DRY and run._replace(film=DRY) in beds}
     roughness = list(ROUGHNESS)
-    return sorted(pairs, key=lambda pair: (pair[0].agitated, pair[0], roughness.index(pair[1])))
+    return sorted(pairs, key=lambda pair: (not pair[0].agitated, pair[0], roughness.index(pair[1])))
 
 
 # ---------------------------------------------------------------- files
@@ -103,9 +103,8 @@ def finished_beds(home: Path) -> Beds:
     return beds
 
 
-_KEYS = ("stokes_terminal", "solid_fraction", "density_ratio", "agitated", "film", "seed")
-_SET = ("roughness", "youngs_modulus", "viscosity", "velocity", "reynolds")
-_SET_UNITS = ("m", "Pa", "Pa s", "m/s", "-")
+_KEYS = ("reynolds", "solid_fraction", "density_ratio", "agitated", "film", "seed")
+_SET = {"roughness": "m", "youngs_modulus": "Pa", "viscosity": "Pa s", "velocity": "m/s"}
 
 
 def write_beds(beds: Beds, path: Path) -> None:
@@ -113,16 +112,14 @@ def write_beds(beds: Beds, path: Path) -> None:
     with replacing(path) as fresh, fresh.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow([
-            *(f"{name} [-]" for name in _KEYS), *(f"{name} [{unit}]" for name, unit in zip(_SET, _SET_UNITS)),
-            *(f"{name} [{unit}]" for name, unit in UNITS.items()),
+            *(f"{name} [-]" for name in _KEYS), *(f"{name} [{unit}]" for name, unit in (_SET | UNITS).items()),
         ])  # fmt: skip
         for run, means in sorted(beds.items()):
             case = bed(*run)
             velocity = case.bed.inlet_velocity
             assert isinstance(velocity, float)
             roughness = math.nan if run.film == DRY else ROUGHNESS[run.film]
-            modulus, viscosity = case.solid.youngs_modulus, viscosity_of(case)
-            described = (roughness, modulus, viscosity, velocity, reynolds(case))
+            described = (roughness, case.solid.youngs_modulus, viscosity_of(case), velocity)
             numbers = (*described, *(means.get(name, math.nan) for name in UNITS))
             point = run.point
             out.writerow([
@@ -136,8 +133,8 @@ def read_beds(lines: Iterable[str]) -> Beds:
     beds: Beds = {}
     for row in csv.DictReader(lines):
         values = {name.split(" [")[0]: text for name, text in row.items()}
-        stokes, solid_fraction, density_ratio = (float(values[name]) for name in _KEYS[:3])
-        point = Point(stokes, solid_fraction, density_ratio, values["agitated"] == "1")
+        reynolds, solid_fraction, density_ratio = (float(values[name]) for name in _KEYS[:3])
+        point = Point(reynolds, solid_fraction, density_ratio, values["agitated"] == "1")
         run = Run(point, values["film"], int(values["seed"]))
         beds[run] = {name: float(values[name]) for name in UNITS if values[name]}
     return beds

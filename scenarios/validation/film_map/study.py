@@ -1,4 +1,4 @@
-"""The map of films: beds with and without films over Stokes number, roughness, solid fraction and density ratio.
+"""The map of films: agitated beds with and without films over four dimensionless numbers.
 
 Each bed with a film is compared with the bed without one from the same seed. Runs are kept: interrupted runs are
 continued, finished ones are not repeated, and several processes may share them.
@@ -136,12 +136,14 @@ PANELS = {
 """Title of each panel, and label and unit of its axis."""
 
 COLOURS = dict(zip(SOLID_FRACTIONS, (SKY, GREEN, BLUE)))
-OF_HEAVY = dict(zip(SOLID_FRACTIONS, (ORANGE, RED, GREY)))
+OF_HEAVY = dict(zip(SOLID_FRACTIONS, (ORANGE, GREY, RED)))
 MARKS = dict(zip(ROUGHNESS, "osD"))
 
 
 def draw(beds: Beds, path: Path) -> None:
     """Changes by films, and shares, against the median Stokes number of the collisions."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     figure, axes = blank(2, 3, width=11.0, height=7.2)
     for panel, (measure, (title, name, unit)) in zip(axes, PANELS.items()):
         factor, none = (1.0, 1.0) if measure == "dissipation" else (100.0, 0.0)
@@ -156,10 +158,9 @@ def draw(beds: Beds, path: Path) -> None:
         if measure in CHANGED:
             panel.axhline(none, color="0.4", linewidth=0.8, zorder=0)
         panel.set_xscale("log")
-        if measure == "dissipation":
-            panel.set_yscale("log")
-            panel.yaxis.set_major_formatter("{x:g}")
-            panel.yaxis.set_minor_formatter("{x:g}")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
         label(panel, "median St of the collisions", "-", name, unit, title)
     _explain(axes[-1], beds)
     save(figure, path)
@@ -174,7 +175,7 @@ def _style(solid_fraction: float, density_ratio: float, film: str, agitated: boo
     colour = (OF_HEAVY if heavy else COLOURS)[solid_fraction]
     light = density_ratio == min(DENSITY_RATIOS)
     return {
-        "fmt": MARKS[film], "color": colour, "mfc": "white" if agitated else colour, "markersize": 4 if light else 6,
+        "fmt": MARKS[film], "color": colour, "mfc": colour if agitated else "white", "markersize": 4 if light else 6,
         "capsize": 2, "linewidth": 1.0,
     }  # fmt: skip
 
@@ -186,14 +187,14 @@ def _explain(axes: Any, beds: Beds) -> None:
     for density_ratio in DENSITY_RATIOS:
         for solid_fraction in SOLID_FRACTIONS:
             if any((p.density_ratio, p.solid_fraction) == (density_ratio, solid_fraction) for p, _ in shown):
-                style = _style(solid_fraction, density_ratio, next(iter(MARKS)), False)
+                style = _style(solid_fraction, density_ratio, next(iter(MARKS)), True)
                 axes.errorbar([], [], **style, label=f"density ratio {density_ratio:g}, {solid_fraction:g} solids")
     for film, roughness in ROUGHNESS.items():
         if any(other == film for _, other in shown):
             style = {"fmt": MARKS[film], "color": "0.3", "label": f"{film}: roughness {roughness / 5e-4:g} R*"}
             style["label"] += ", deformed" if film == "soft" else ""
             axes.errorbar([], [], **style, linewidth=1.0)
-    if any(point.agitated for point, _ in shown):
-        axes.errorbar([], [], fmt="o", color="0.3", mfc="white", label="hollow: with agitation", linewidth=1.0)
+    if any(not point.agitated for point, _ in shown):
+        axes.errorbar([], [], fmt="o", color="0.3", mfc="white", label="hollow: without agitation", linewidth=1.0)
     if shown:
         axes.legend(loc="center left", frameon=False, fontsize=9.5)
