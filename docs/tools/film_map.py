@@ -171,9 +171,8 @@ def headline(beds: Beds) -> str:
         )
     )  # fmt: skip
     return (
-        f"In agitated beds with median Stokes numbers of {' and '.join(stokes)}, films change the collision rate by "
-        f"{' and '.join(collisions)} %, the granular temperature by {' and '.join(temperature)} %, and the bed height "
-        f"by {' and '.join(height)} %{part}."
+        f"At median Stokes numbers of {' and '.join(stokes)}, films change collisions by {' and '.join(collisions)} %, "
+        f"granular temperature by {' and '.join(temperature)} %, and bed height by {' and '.join(height)} %{part}."
     )
 
 
