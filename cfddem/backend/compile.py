@@ -1,8 +1,8 @@
 """How a loop is compiled, cached and threaded.
 
     serial         a loop; the machine code is kept between runs. Within another loop it is a part of that
-    threaded       a loop over `prange` that runs on all threads; kept between runs. For one thread it is compiled
-                   without them, in a third of the time
+    threaded       a loop over `prange` that runs on all threads, over arrays that do not overlap; kept between runs.
+                   For one thread it is compiled without them, in a third of the time
     either         a loop over `prange` for one thread, or for all where `law_set.specialise` compiles it so; kept
     part           a loop over `prange` that is part of a larger one, and is kept with that; for threads as `either`
     threaded_part  the same, on all threads
@@ -73,8 +73,9 @@ __all__ = [
 ]
 
 if "OMP_WAIT_POLICY" not in os.environ:
-    # A thread that waits for another by spinning keeps it from its core where other work runs too, and a step takes
-    # a hundred times as long. A short spin, then sleep, costs a quiet machine little.
+    # A thread that waits for another by spinning keeps it from its core where other work runs too: by default for
+    # some ms, and a step then takes a hundred times as long. A sleep needs 60 us to end, as long as small loops take.
+    # So a thread spins for about 0.1 ms, and then sleeps.
     os.environ.setdefault("GOMP_SPINCOUNT", "10000")
 
 CHUNKS = 64
@@ -136,7 +137,10 @@ class Threaded:
 
 
 def threaded(function: Callable[..., Any]) -> Any:
-    """Compile a loop over `prange` that runs on all threads; kept on disk."""
+    """Compile a loop over `prange` that runs on all threads; kept on disk.
+
+    No array that it writes shares memory with another argument: the compiler relies on that, on any number of threads.
+    """
     return _marked(Threaded(function), threaded)
 
 

@@ -92,9 +92,9 @@ def _named(kind: str, name: str) -> Law:
     if name not in laws:
         choices = [*BUILT_IN[kind], *(law.name for law in laws.values() if _can_be_called(kind, law))]
         remedy = "cfddem explain lists all laws; name the file of one of your own with --laws FILE.py"
-        if imported_laws():
-            files = ", ".join(file.name for file in imported_laws())
-            remedy = f'in {files}, put @closures.law("{kind}", source) before the function of this name'
+        undeclared = [file.name for file in imported_laws() if hasattr(sys.modules[file.stem], name)]
+        if undeclared:
+            remedy = f'in {undeclared[0]}, put @closures.law("{kind}", source) before the function of this name'
         lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
         remedy = "; ".join([remedy, *lost])
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(choices)), remedy)

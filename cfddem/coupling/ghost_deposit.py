@@ -34,6 +34,9 @@ LAYERS = THINNEST
 """Layers of cells around a brick. A particle may lie half a cell less beyond it: it moves until the next neighbour
 list, and is mapped where it was two fluid steps ago, or where it will be after the next one."""
 
+TO_HOME = 3
+"""Layers more beside solid and small cells: what is deposited on one goes to another so far away, at most."""
+
 NEARLY = 1e-6
 """Part of a cell by which a plane between two ranks may miss the border of cells on which it lies."""
 
@@ -83,10 +86,11 @@ class GhostDeposit:
         self.grid, self.periodic, self.division = grid, np.array(periodic, bool), division
         counts = np.array(grid.whole.cells)
         self._bare = self._box = np.array([[0, 0, 0], counts])  # cells of the brick, and those of the box, from and to
-        self._layers = np.zeros(3, np.int64)
+        self._layers = self._around = np.zeros(3, np.int64)  # that particles reach, and all around the brick
         if isinstance(grid, Block):
             bricks = division or Bricks(grid.division.planes(grid.whole))
             self._layers = LAYERS * np.array(parts) * (np.array(bricks.shape) > 1)
+            self._around = self._layers + TO_HOME * (self._layers > 0) * (grid.whole.solid is not None)
             self._share(grid, bricks)
         nx, ny, nz = (self._box[1] - self._box[0]).tolist()
         self.shape, self.wraps = (nz, ny, nx), self.periodic & (self._layers == 0)
@@ -97,12 +101,12 @@ class GhostDeposit:
         low, high = (bricks.ends - np.array(whole.origin)) / np.array(whole.spacing)
         low, high = np.floor(low + NEARLY), np.ceil(high - NEARLY)
         bare = np.clip([low, np.maximum(low, high)], 0, counts).astype(np.int64)
-        boxes = bare + np.array([-self._layers, self._layers])[:, None]
+        boxes = bare + np.array([-self._around, self._around])[:, None]
         boxes = np.where(self.periodic, boxes, np.clip(boxes, 0, counts))
         self._bare, self._box = bare[:, rank], boxes[:, rank]
         ends = [[np.array(begins)[n : len(begins) - 1 + n] for begins in block.division.starts] for n in (0, 1)]
         cells = np.array([np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) for axes in ends])
-        around = [range(-n, n + 1) for n in np.where(self.periodic, -(-self._layers // counts), 0).tolist()]
+        around = [range(-n, n + 1) for n in np.where(self.periodic, -(-self._around // counts), 0).tolist()]
         shifts = [np.array(image) * counts for image in itertools.product(*around)]
         self._communicator = block.communicator
         self._in_box = _overlaps(self._box, cells, shifts)
@@ -133,7 +137,7 @@ class GhostDeposit:
         if others is not None:
             homes = self._moved(homes, np.array(np.unravel_index(others, whole.shape)).reshape(3, *whole.shape))
         begin = self._box[0][::-1, None, None, None]
-        # a particle cannot reach a home so deep in the solid that it lies outside
+        # the home of a cell that a particle can reach is inside
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
         return np.ravel_multi_index(tuple(inside), self.shape).ravel()
 

@@ -47,7 +47,7 @@ PIECES = 32
 """Number of pieces of the divided mapping."""
 
 SLAB = 4
-"""Least number of cell layers that one thread fills at a time. Slabs that are filled at the same time do not touch."""
+"""Least number of cell layers that one thread fills at a time."""
 
 
 class Stencil(NamedTuple):
@@ -226,16 +226,22 @@ class FilterKernel:
     def map_particles(self, position: Array, radius: Array) -> ParticleCellMap:
         """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
         stencil = self.stencil(position, radius)
-        slabs = max(self.reach.shape[0] // SLAB, 1)
+        layers = self._layers_of_a_slab(radius)
+        slabs = max(self.reach.shape[0] // layers, 1)
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
-        loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
+        loops.sort_into_slabs(position, low, self._axes.inverse[2], layers, order, start)
         number, places = int(self.communicator.sum([len(position)])), []
         for kind in range(len(self.stages) if self.unequal else 0):
             own = self.kinds(radius)[order] == kind
             places.append((order[own], np.append(0, np.cumsum(own))[start]))
         volume = sphere_volume(radius)
         return ParticleCellMap(position.copy(), radius, volume, order, start, stencil, number, tuple(places))
+
+    def _layers_of_a_slab(self, radius: Array) -> int:
+        """So many that no two slabs of even number, nor of odd number, deposit on the same cells."""
+        beyond = math.ceil(np.max(radius, initial=0.0) * self._offsets[:, 2].max() * self._axes.inverse[2])
+        return max(SLAB, 2 * beyond + 2)
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""

@@ -65,17 +65,19 @@ class MergedCells(SingleCells):
 
     def shared(self, deposits: Array) -> Array:
         """See `SingleCells.shared`."""
-        return self._taken(deposits, self._groups.copied) / self._total
+        return self._with_group_values(deposits, self._groups.copied) / self._total
 
     def averaged(self, fields: Array) -> Array:
         """See `SingleCells.averaged`."""
-        return self._taken(fields, lambda values: self._groups.summed(values * self._open) / self._groups.total)
+        return self._with_group_values(
+            fields, lambda values: self._groups.summed(values * self._open) / self._groups.total
+        )
 
     def copied(self, fields: Array) -> Array:
         """See `SingleCells.copied`."""
-        return self._taken(fields, self._groups.copied)
+        return self._with_group_values(fields, self._groups.copied)
 
-    def _taken(self, fields: Array, of_groups: Callable[[Array], Array]) -> Array:
+    def _with_group_values(self, fields: Array, of_groups: Callable[[Array], Array]) -> Array:
         """A copy of fields (m, nz, ny, nx) with other values in the cells of groups."""
         taken = np.array(fields, float)
         flat, at = taken.reshape(len(taken), -1), self._groups.at

@@ -365,8 +365,14 @@ class HeatExchangeOfContacts(CaseFeature):
         )  # fmt: skip
         if self._thin:
             near = np.flatnonzero(between)
-            begin = particles.position[first[near]]
-            between[near[self._thin.between(begin, begin - self._apart(solver)[near])]] = 0.0
+            one, other, apart = (
+                particles.position[first[near]],
+                particles.position[second[near]],
+                self._apart(solver)[near],
+            )
+            # also from the second: across a periodic side the wall is beside one of them
+            behind = self._thin.between(one, one - apart) | self._thin.between(other, other + apart)
+            between[near[behind]] = 0.0
         body, piece = first[pairs:], second[pairs:]
         wall = walls.wall[piece]
         # one link of a particle and a wall: at the nearest of its pieces

@@ -1,7 +1,8 @@
 """Groups of cut cells: a small one belongs to the nearest that is at least half open.
 
 A scalar has one value in all cells of a group, and the balance of a group is that of its open volume. So a cell of any
-size takes part without limiting the step, and nothing is lost between cells. No group reaches through a thin wall.
+size takes part without limiting the step, and nothing is lost between cells. No cell with fluid belongs to a group
+behind a thin wall; a solid cell may, whose faces are closed.
 
 Groups are those of the whole box, which every rank finds before the run starts. Where a group has cells of several
 ranks, that of its large cell adds them, in the order of one process, and gives the sum back.
@@ -103,22 +104,24 @@ class Groups:
         large, self._group = np.unique(home[members], return_inverse=True)
         self._large, of_own, of_members = np.searchsorted(own, large), owner[home[own]], owner[members]
         # own cells by the rank of their large cell, and all cells of groups whose large cell is here by their rank
-        self._away = {other: np.flatnonzero(of_own == other) for other in np.unique(of_own).tolist()}
-        self._held = {other: np.flatnonzero(of_members == other) for other in np.unique(of_members).tolist()}
+        self._sent = {other: np.flatnonzero(of_own == other) for other in np.unique(of_own).tolist()}
+        self._received = {other: np.flatnonzero(of_members == other) for other in np.unique(of_members).tolist()}
 
     def summed(self, values: Array) -> Array:
         """Sums over groups of values of the cells `at` (m, n), in all of these."""
-        members = self._exchanged(values, self._away, self._held, len(self._group))
+        members = self._exchanged(values, self._sent, self._received, len(self._group))
         count = len(self._large)
-        return self._back(np.array([np.bincount(self._group, weights=field, minlength=count) for field in members]))
+        return self._to_members(
+            np.array([np.bincount(self._group, weights=field, minlength=count) for field in members])
+        )
 
     def copied(self, values: Array) -> Array:
         """Values of the large cells of the cells `at`, of values of these (m, n)."""
-        return self._back(values[:, self._large])
+        return self._to_members(values[:, self._large])
 
-    def _back(self, of_groups: Array) -> Array:
+    def _to_members(self, of_groups: Array) -> Array:
         """Values of groups whose large cell is here (m, groups), in the cells `at` of all ranks."""
-        return self._exchanged(of_groups[:, self._group], self._held, self._away, len(self.at))
+        return self._exchanged(of_groups[:, self._group], self._received, self._sent, len(self.at))
 
     def _exchanged(self, values: Array, outgoing: Columns, wanted: Columns, count: int) -> Array:
         """Values (m, count) of which each rank has given some columns of its own, in the places that are wanted."""

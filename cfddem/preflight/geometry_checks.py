@@ -144,12 +144,12 @@ def _largest_overlap(positions: np.ndarray, diameter: float) -> tuple[float, tup
     """Largest overlap of equal spheres over their diameter, and the rows of the pair."""
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(positions).query_pairs(diameter, output_type="ndarray")
-    if not len(pairs):
+    if len(positions) < 2:
         return 0.0, (0, 0)
-    distance = np.linalg.norm(positions[pairs[:, 0]] - positions[pairs[:, 1]], axis=1)
-    first, second = pairs[np.argmin(distance)].tolist()
-    return 1.0 - float(distance.min()) / diameter, (first, second)
+    distance, nearest = cKDTree(positions).query(positions, k=2)
+    row = int(np.argmin(distance[:, 1]))
+    other = next(each for each in nearest[row].tolist() if each != row)
+    return max(0.0, 1.0 - float(distance[row, 1]) / diameter), (row, other)
 
 
 # ---------------------------------------------------------------- units

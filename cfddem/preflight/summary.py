@@ -229,8 +229,8 @@ def check_own_laws(case: Case) -> Iterator[Issue]:
     if not contact.force.__module__.startswith("cfddem."):
         species = next(iter(case.species.values()))
         mass, radius = reduced(case, species, species.diameter)
-        for problem in contact.problems(mass, radius, pair_row(case, species)):
-            severity: Severity = "warning" if "but force rises" in problem else "error"
+        for fatal, problem in contact.problems(mass, radius, pair_row(case, species)):
+            severity: Severity = "error" if fatal else "warning"
             yield Issue(severity, "laws.contact", f"{contact.name}: {problem}", "correct the functions of the law")
     for name, reason in registry.load_package_laws().items():
         yield Issue("warning", "laws", f"the package {name} could not be loaded: {reason}", "correct or remove it")

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import t as student
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT)] * (str(ROOT) not in sys.path)
@@ -133,12 +134,13 @@ def mean_of(beds: Beds, pairs: Iterable[Pair], what: str) -> Estimate | None:
 
 
 def clear(beds: Beds, pairs: Sequence[Pair], what: str) -> str:
-    """How many changes are up and down by more than two of their errors."""
+    """How many changes are up and down beyond the interval that holds 95 % of them, by Student's t."""
     known = [each for pair in pairs if (each := of_pair(beds, pair, what)) is not None and not math.isnan(each.error)]
     if not known:
         return "errors are not known yet"
-    up, down = (sum(way * each.value > 2.0 * each.error for each in known) for way in (1.0, -1.0))
-    return f"up in {up} and down in {down} of {len(known)} beds by more than two errors"
+    limits = [float(student.ppf(0.975, each.seeds - 1)) * each.error for each in known]
+    up, down = (sum(way * each.value > limit for each, limit in zip(known, limits)) for way in (1.0, -1.0))
+    return f"up in {up} and down in {down} of {len(known)} beds, with 95 % confidence by Student's t"
 
 
 def between(values: Sequence[float], unit: str = " %") -> str:
@@ -197,14 +199,14 @@ def sections(beds: Beds) -> Iterator[str]:
     )
     yield "### Means over the map"
     yield wrapped(
-        "Smooth and rough spheres of the coarse design, and soft ones and a bed without agitation beside them. Changes "
+        "Beds of the coarse design; rows by Stokes number and solid fraction are of smooth and rough spheres. Changes "
         "are relative to the bed without films. The errors are those by the seeds."
     )
     yield table(beds, "beds", list(_groups(beds)))
     moved, still = (effects.mean(beds, point, DRY, "granular_temperature") for point in (AGITATED, STILL))
     if moved is not None and still is not None:
         yield wrapped(
-            f"Without agitation and films, the bed of the last two rows has a granular temperature of "
+            f"Without agitation and films, the bed of the last rows has a granular temperature of "
             f"{shown(still, 1e6, False)} mm2/s2, with agitation {shown(moved, 1e6, False)}."
         )
     yield "### What the papers say, and what the map says"
@@ -223,8 +225,9 @@ def _groups(beds: Beds) -> Iterator[tuple[str, list[Pair]]]:
     pairs = effects.compared(beds)
     for film in effects.ROUGHNESS:
         yield f"{film} spheres", [pair for pair in pairs if is_corner(pair[0]) and pair[1] == film]
-    yield "one bed without agitation", [pair for pair in pairs if pair[0] == STILL]
-    yield "the same with agitation", [pair for pair in hard(beds) if pair[0] == AGITATED]
+    if still := [pair for pair in pairs if pair[0] == STILL]:
+        yield "one bed without agitation", still
+        yield "the same with agitation", [pair for pair in hard(beds) if pair[0] == AGITATED]
 
 
 def table(beds: Beds, first: str, rows: Sequence[tuple[str, list[Pair]]]) -> str:

@@ -376,3 +376,20 @@ def test_a_sediment_under_its_suspension_stays_at_rest(surface: str) -> None:
     for time in 0.02 * np.arange(1, 11):
         simulation.until(time)
         assert np.abs(simulation.particles.velocity).max() < 0.06  # a sphere alone falls with 0.073 m/s
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize(("mapping", "radius"), [("linear", 0.4), ("divided", 0.4), ("divided", 1.1), ("divided", 2.1)])
+def test_slabs_that_are_filled_at_the_same_time_share_no_cells(mapping: str, radius: float, periodic: bool) -> None:
+    """Even slabs are filled by several threads, then odd ones; also where pieces of spheres lie in other slabs."""
+    kernel = FilterKernel(Grid((5, 5, 60), (1.0,) * 3), (False, False, periodic), mapping=mapping)
+    position = np.random.default_rng(1).uniform((0.0, 0.0, 0.0), (5.0, 5.0, 60.0), (3000, 3))
+    cell_map = kernel.map_particles(position, np.full(3000, radius))
+    layer = 7 * 7  # cells of a layer, with those around
+    filled = []
+    for begin, end in itertools.pairwise(cell_map.start):
+        lowest = cell_map.stencil.first[cell_map.order[begin:end]] // layer
+        filled.append(set(lowest.ravel().tolist()) | set((lowest + 1).ravel().tolist()))
+    assert len(filled) > 3
+    for one, other in itertools.combinations(range(len(filled)), 2):
+        assert (one + other) % 2 or not filled[one] & filled[other], (one, other)

@@ -127,6 +127,12 @@ BEDS = {
         SEEDS, column__height=0.036, column__cell=0.0012, bed__count=500, heat=HEAT,
         vessel={"shape": "cone", "radius": 0.004, "length": 0.02},
     ),
+    "hot gas in a cone with a draft tube": case_of(
+        SEEDS, column__height=0.036, column__cell=0.0012, bed__count=500, heat=HEAT,
+        vessel={"shape": "cone", "radius": 0.004, "length": 0.02},
+        vapour={"fluid_fraction": 0.002, "inlet_fraction": 0.01, "diffusivity": 2.5e-5},
+        wall=[{**TUBE, "point": [0.0072, 0.0072, 0.006], "radius": 0.0025, "length": 0.012}],
+    ),
 }  # fmt: skip
 PLAIN = {"cylinder": (1, 2, 1), "cone, sharp": (2, 2, 1)}
 """The shape in which a bed is divided in a plain test; the slow ones take all shapes."""

@@ -171,8 +171,8 @@ class ContactLaw:
         """Overlap under a load [N] in [m]; infinite if the law does not carry it."""
         return _first(lambda overlap: self.evaluate(self.force, overlap, mass, radius, row) >= load, radius)
 
-    def problems(self, mass: float, radius: float, row: Any) -> Iterator[str]:
-        """What is wrong with the functions of the law at overlaps from 1e-6 to 2 % of a diameter, in words.
+    def problems(self, mass: float, radius: float, row: Any) -> Iterator[tuple[bool, str]]:
+        """What is wrong with the functions at overlaps from 1e-6 to 2 % of a diameter: whether fatal, and words.
 
         Each function must give a finite number, the stiffness be positive, and the damping not negative. A stiffness
         that is less than half of the slope of the force lets the time step be too long.
@@ -187,24 +187,24 @@ class ContactLaw:
                 try:
                     values[name] = self.evaluate(function, overlap, mass, radius, row)
                 except InputError as failure:
-                    yield str(failure)
+                    yield True, str(failure)
                     return
                 except Exception as failure:  # whatever a user's function raises
-                    yield f"{name} fails ({failure}) {at}"
+                    yield True, f"{name} fails ({failure}) {at}"
                     return
                 if not math.isfinite(values[name]):
-                    yield f"{name} is {values[name]} {at}"
+                    yield True, f"{name} is {values[name]} {at}"
                     return
             stiffness, damping = values["stiffness"], values["damping"]
             if stiffness <= 0.0 or damping < 0.0:
                 limit = "stiffness must be positive, and damping not negative"
-                yield f"stiffness is {stiffness:.3g} N/m and damping {damping:.3g} kg/s {at}: {limit}"
+                yield True, f"stiffness is {stiffness:.3g} N/m and damping {damping:.3g} kg/s {at}: {limit}"
                 return
             less, more = (self.evaluate(self.force, side * overlap, mass, radius, row) for side in (0.999, 1.001))
             slope = (more - less) / (0.002 * overlap)
             if stiffness < 0.5 * slope:
                 effect = "the time step follows from stiffness"
-                yield f"stiffness is {stiffness:.3g} N/m, but force rises by {slope:.3g} N/m {at}; {effect}"
+                yield False, f"stiffness is {stiffness:.3g} N/m, but force rises by {slope:.3g} N/m {at}; {effect}"
                 return
 
     def _known(self, mass: float, radius: float, row: Any) -> dict[str, Any]:
