@@ -33,6 +33,9 @@ LEAST_RISE = 0.4
 """How much farther from the wall the next face must be, for a curvature to be taken, in cells."""
 
 
+DIGITS = 11
+"""Decimals of weights that are kept, over the largest square of the inverse spacing."""
+
 OF_A_BLOCK = 4
 """What a block of faces takes besides, in faces."""
 
@@ -181,11 +184,12 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     is_stiff = stiff > 0.0
     # beyond an outlet the fluid is not continuous: convection and growth there act on equally much fluid, or u grows
     at_outlet = np.isin(at // steps[d] % shape[2 - d], [layer for axis, layer in outlets if axis == d])
-    acting = np.where(at_outlet, np.maximum(open_share, FULL), open_share)
+    acting = _rounded(np.where(at_outlet, np.maximum(open_share, FULL), open_share))
     fill = _in_blocks(at // steps[2])
     beside: Any = (farther - place).astype(np.uint32)
-    scaled = [weight / inverse.max() ** 2, constant, pull / inverse.max() ** 2, acting, further, beside]
-    pattern, first = _patterns(scaled, fill)
+    square = inverse.max() ** 2
+    weight, constant, pull = square * _rounded(weight / square), _rounded(constant), square * _rounded(pull / square)
+    pattern, first = _patterns([weight, constant, pull, acting, further, beside], fill)
 
     def of_patterns(values: Any) -> Any:
         return np.ascontiguousarray(np.moveaxis(values[..., fill[first]], -2, 0))
@@ -211,12 +215,18 @@ def _in_blocks(planes: Any) -> Any:
     return np.concatenate(blocks) if blocks else np.zeros((0, width), np.int64)
 
 
-def _patterns(values: Sequence[Array], fill: Any) -> tuple[Any, Any]:
-    """Which blocks have equal values up to round-off: the pattern of each block, and the first block of each."""
+def _rounded(values: Array) -> Array:
+    """Values of order 1 without their last digits, in which the planes of an upright column differ: ranks that begin at
+    different planes then have the same."""
+    return np.asarray(np.round(values, DIGITS) + 0.0)
+
+
+def _patterns(values: Sequence[Any], fill: Any) -> tuple[Any, Any]:
+    """Which blocks have equal values: the pattern of each block, and the first block of each."""
     patterns: dict[bytes, int] = {}
     number = []
     for block in fill:
-        key = b"".join((np.round(array[..., block].astype(float), 9) + 0.0).tobytes() for array in values)
+        key = b"".join(array[..., block].tobytes() for array in values)
         number.append(patterns.setdefault(key, len(patterns)))
     pattern = np.array(number, np.int64)
     return pattern, np.unique(pattern, return_index=True)[1]
