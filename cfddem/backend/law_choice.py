@@ -95,6 +95,8 @@ def _named(kind: str, name: str) -> Law:
         undeclared = [file.name for file in imported_laws() if hasattr(sys.modules[file.stem], name)]
         if undeclared:
             remedy = f'in {undeclared[0]}, put @closures.law("{kind}", source) before the function of this name'
+        elif imported_laws():
+            remedy += f"; {', '.join(file.name for file in imported_laws())} declares none of this name"
         lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
         remedy = "; ".join([remedy, *lost])
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(choices)), remedy)

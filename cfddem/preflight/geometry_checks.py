@@ -148,7 +148,7 @@ def _largest_overlap(positions: np.ndarray, diameter: float) -> tuple[float, tup
         return 0.0, (0, 0)
     distance, nearest = cKDTree(positions).query(positions, k=2)
     row = int(np.argmin(distance[:, 1]))
-    other = next(each for each in nearest[row].tolist() if each != row)
+    other = next(neighbour for neighbour in nearest[row].tolist() if neighbour != row)
     return max(0.0, 1.0 - float(distance[row, 1]) / diameter), (row, other)
 
 

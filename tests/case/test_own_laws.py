@@ -358,7 +358,12 @@ def test_explain_shows_a_law_of_a_file(stopped: tuple[Path, Path]) -> None:
         ("    return 1.0 if reynolds > 1e9 else None", "odd", "returns None, which is no number"),
         ("    return str(reynolds)", "odd", "which is no number"),
         ("    return [1.0][int(reynolds) + 1]", "odd", "odd fails (list index out of range)"),
-        ("    return 1.0", "not_there", 'put @closures.law("drag", source) before the function of this name'),
+        ("    return 1.0", "not_there", "declares none of this name"),
+        (
+            "    return 1.0\n\ndef bare(reynolds, voidage):\n    return 1.0",
+            "bare",
+            'put @closures.law("drag", source) before the function of this name',
+        ),
     ],
 )
 def test_a_wrong_function_of_a_file_is_refused_in_a_line(

@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import sys
+from collections.abc import Sequence
 from contextlib import redirect_stderr
 from importlib.util import find_spec
 from pathlib import Path
@@ -304,7 +305,7 @@ def test_a_sweep_keeps_finished_runs_lists_failed_ones_and_continues(
 def test_a_stopped_sweep_begins_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from cfddem.studies import sweep
 
-    def one(case: Case, values: dict[str, int], folder: Path, alone: bool) -> sweep.Outcome:
+    def one(case: Case, values: dict[str, int], folder: Path, alone: bool, laws: Sequence[Path]) -> sweep.Outcome:
         status = "stopped" if values["bed.seed"] == 2 else "failed"
         return sweep.Outcome(str(folder), values, status, "of a test")
 

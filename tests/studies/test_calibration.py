@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,7 @@ def test_a_wrong_range_is_refused(given: list[str], words: str) -> None:
 
 
 def test_a_sweep_takes_values_or_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool) -> sweep.Outcome:
+    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool, laws: Sequence[Path]) -> sweep.Outcome:
         return sweep.Outcome(
             str(folder), values, "finished", measures={"bed_height": (values["bed.diameter"], 0.1, "m")}
         )
@@ -139,7 +140,7 @@ def box(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A case and data; runs above a restitution of 0.9 fail, others are a formula."""
     pytest.importorskip("optuna")
 
-    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool) -> sweep.Outcome:
+    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool, laws: Sequence[Path]) -> sweep.Outcome:
         failed = values[VARY.key] > 0.9
         return sweep.Outcome(
             str(folder), values, "failed" if failed else "finished", "lost, of a test" if failed else ""
@@ -185,7 +186,7 @@ def test_the_search_finds_the_value_survives_failures_and_continues(box: Path) -
 def test_another_calibration_is_refused_its_folder(box: Path) -> None:
     search(2)
     (box / "case.toml").write_text(BED.replace("0.05\n", "0.04\n"))
-    with pytest.raises(InputError, match="same case, data and ranges"):
+    with pytest.raises(InputError, match="same case, laws, data and ranges"):
         search(3)
 
 

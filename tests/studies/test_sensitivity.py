@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +123,7 @@ def test_the_command_runs_each_point_once_and_writes_table_and_figure(
 ) -> None:
     """The height follows the velocity and the drag law, not the restitution."""
 
-    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool) -> sweep.Outcome:
+    def one(case: Any, values: dict[str, Any], folder: Path, alone: bool, laws: Sequence[Path]) -> sweep.Outcome:
         height = values["bed.inlet_velocity"] + 0.01 * (values["laws.drag"] == "wen_yu")
         return sweep.Outcome(str(folder), values, "finished", measures={"bed_height": (height, 1e-4, "m")})
 

@@ -134,7 +134,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     """Pellets near the middle plane at some times, coloured by their liquid, mean velocity and temperature of the air,
     the circulation, and how many pellets carry how much."""
     ratios = [*[1.0] * (len(times) + 2), 1.6, 1.6]
-    drawn, axes = panels(len(times) + 4, width=12.5, height=3.4, width_ratios=ratios)
+    drawn, axes = panels(len(times) + 4, width=11.0, height=3.1, width_ratios=ratios)
     for axis, time in zip(axes, times):
         shown, balls = draw_spheres(axis, run, case, time, reach=0.75, size=9.0, most=MOST, by="liquid")
         axis.set_title(f"{shown:.2f} s", fontsize=9.5)
@@ -169,7 +169,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     legend(curve, loc="upper right")
     carried = coating(run, case).liquid * CUBIC_MILLIMETRES
     histogram.hist(carried[carried > 0.0], bins=np.linspace(0.0, 2.0 * MOST, 25), color=BLUE)
-    histogram.set(xlabel="liquid on a pellet  [mm3]", yscale="log")
+    histogram.set(xlabel="on a pellet  [mm3]", yscale="log")
     histogram.set_title("wet pellets, at the end", fontsize=9.5)
     save(drawn, path)
 
