@@ -240,7 +240,8 @@ class FilterKernel:
 
     def _layers_of_a_slab(self, radius: Array) -> int:
         """So many that no two slabs of even number, nor of odd number, deposit on the same cells."""
-        beyond = math.ceil(np.max(radius, initial=0.0) * self._offsets[:, 2].max() * self._axes.inverse[2])
+        reach = np.max(radius, initial=0.0) * self._offsets[:, 2].max()  # local: own particles
+        beyond = math.ceil(reach * self._axes.inverse[2])
         return max(SLAB, 2 * beyond + 2)
 
     def wrapped(self, position: Array) -> Array:
