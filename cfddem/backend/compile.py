@@ -123,7 +123,8 @@ class Threaded:
 
     def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
-        self.one = kept_on_disk(njit(**CALLED, noalias=True)(renamed(function, f"{function.__name__}_on_one_thread")))
+        alone = njit(**(CALLED | {"noalias": True}))
+        self.one = kept_on_disk(alone(renamed(function, f"{function.__name__}_on_one_thread")))
         self.all = kept_on_disk(njit(**CALLED, parallel=True)(function))
 
     @property
