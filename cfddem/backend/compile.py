@@ -59,6 +59,7 @@ __all__ = [
     "announced",
     "either",
     "fused",
+    "get_num_threads",
     "inline",
     "kept_whole",
     "part",

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import use_threads
+from cfddem.backend.compile import get_num_threads
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
@@ -282,7 +282,7 @@ class FilterKernel:
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
         slabs = places or (cell_map.order, cell_map.start)
-        loops.deposit(slabs, values, unit, *cell_map.stencil, self._corners, use_threads(None), deposits)
+        loops.deposit(slabs, values, unit, *cell_map.stencil, self._corners, get_num_threads(), deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
