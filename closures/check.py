@@ -113,7 +113,7 @@ def _finite(entry: Law) -> Iterator[str]:
             yield f"fails ({failure}) at {_shown(stated)}"
             return
         if not isinstance(value, Real):
-            yield f"returns {value!r}, which is no number, at {_shown(stated)}"
+            yield f"returns {value!r}, which is not a number, at {_shown(stated)}"
             return
         if not math.isfinite(value):
             yield f"is {value} at {_shown(stated)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from importlib.util import module_from_spec, spec_from_file_location
 from numbers import Real
@@ -72,7 +72,7 @@ def drag_by_name(law: Law, diameter_ratio: float = 1.0) -> Callable[[float, floa
         if is_built_in(law.function):
             return value
         if not isinstance(value, Real):
-            raise _not_finite(law, f"it returns {value!r}, which is no number,", reynolds, voidage)
+            raise _not_finite(law, f"it returns {value!r}, which is not a number,", reynolds, voidage)
         if math.isfinite(reynolds) and not math.isfinite(value):
             raise _not_finite(law, f"it is {value:g}", reynolds, voidage)
         return value
@@ -123,11 +123,16 @@ def imported_laws() -> list[Path]:
     return [file for name, file in _IMPORTED.items() if name in sys.modules]
 
 
-def import_laws(file: Path) -> None:
-    """Execute a Python file, so that its laws are known; once in a process.
+def import_laws(files: Iterable[Path]) -> None:
+    """Execute Python files, so that their laws are known; once in a process.
 
-    errors  InputError if it is no Python file, or fails
+    errors  InputError if one is no Python file, or fails
     """
+    for file in files:
+        _import(file)
+
+
+def _import(file: Path) -> None:
     if file.suffix != ".py" or not file.stem.isidentifier() or not file.is_file():
         raise InputError("--laws", str(file), "an existing Python file, such as my_laws.py")
     loaded = sys.modules.get(file.stem)

@@ -63,8 +63,7 @@ class Changes:
 
     def import_laws(self) -> None:
         """Make the user's laws known."""
-        for file in self.laws or []:
-            import_laws(file)
+        import_laws(self.laws or ())
 
     def values(self) -> dict[str, Any]:
         """Values by key, after the user's laws are known."""
@@ -323,8 +322,7 @@ def resume(
         remedy = f"to go on with another value: cfddem run --from {folder} {values} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
     communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
-    for file in laws or []:
-        import_laws(file)
+    import_laws(laws or ())
     if until is None and (before := open_run(folder)).status == "finished":
         if communicator.rank == 0 and json:
             _print_report(folder, json)

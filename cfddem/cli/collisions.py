@@ -113,8 +113,7 @@ def _collide(
     **arguments: Any,
 ) -> immersed_pair.Collision | CollisionRange | MeasuredCollisions:
     """Collide two spheres of named materials: once, over a range of Stokes numbers, or at each measured point."""
-    for file in laws or []:
-        import_laws(file)
+    import_laws(laws or ())
     materials, spin = immersed_pair.MATERIALS, arguments.pop("spin")
     own, other = arguments.pop("diameter"), arguments.pop("target_diameter")
     diameters = own, own if other is None else other

@@ -44,8 +44,7 @@ def explain(
     from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
-    for file in laws or []:
-        import_laws(file)
+    import_laws(laws or ())
     by_kind, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
     if law is not None and not pages.is_law(law):
         by_kind, keys = by_kind or pages.containing(law), pages.matching(law)

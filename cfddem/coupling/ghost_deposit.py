@@ -35,7 +35,7 @@ LAYERS = THINNEST
 list, and is mapped where it was two fluid steps ago, or where it will be after the next one."""
 
 TO_HOME = 3
-"""Layers more beside solid and small cells: what is deposited on one goes to another so far away, at most."""
+"""Layers more beside solid and small cells: what is deposited on one goes to the nearest other, seldom farther."""
 
 NEARLY = 1e-6
 """Part of a cell by which a plane between two ranks may miss the border of cells on which it lies."""
@@ -137,7 +137,7 @@ class GhostDeposit:
         if others is not None:
             homes = self._moved(homes, np.array(np.unravel_index(others, whole.shape)).reshape(3, *whole.shape))
         begin = self._box[0][::-1, None, None, None]
-        # the home of a cell that a particle can reach is inside
+        # outside are homes of cells so deep in the solid that no particle reaches them
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
         return np.ravel_multi_index(tuple(inside), self.shape).ravel()
 

@@ -365,11 +365,8 @@ class HeatExchangeOfContacts(CaseFeature):
         )  # fmt: skip
         if self._thin:
             near = np.flatnonzero(between)
-            one, other, apart = (
-                particles.position[first[near]],
-                particles.position[second[near]],
-                self._apart(solver)[near],
-            )
+            one, other = particles.position[first[near]], particles.position[second[near]]
+            apart = self._apart(solver)[near]
             # also from the second: across a periodic side the wall is beside one of them
             behind = self._thin.between(one, one - apart) | self._thin.between(other, other + apart)
             between[near[behind]] = 0.0

@@ -241,8 +241,7 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool, law
 
     begun, kept = time.monotonic(), False
     try:
-        for file in laws:
-            import_laws(file)
+        import_laws(laws)
         if one_thread:
             use_threads(1)
         checked = preflight(case)

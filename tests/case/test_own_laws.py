@@ -249,7 +249,7 @@ def stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[P
     registry.load_built_in_laws()
     monkeypatch.setitem(REGISTRY, "drag", dict(REGISTRY["drag"]))
     (file := tmp_path / "laws_of_a_test.py").write_text(OWN)
-    import_laws(file)
+    import_laws([file])
     changes = {
         "laws.drag": "of_a_file", "laws.lubrication": "none", "bed.start": "suspended", "bed.count": 50,
         "run.until": 0.002, "run.every": 0.001, "run.average_from": 0.0, "column.height": 0.032,
@@ -306,7 +306,7 @@ def test_a_file_of_laws_that_is_none_is_refused(tmp_path: Path) -> None:
     ]:
         (tmp_path / name).write_text(text)
         with pytest.raises(InputError, match=said):
-            import_laws(tmp_path / name)
+            import_laws([tmp_path / name])
     assert "broken_laws" not in sys.modules
 
 
@@ -355,8 +355,8 @@ def test_explain_shows_a_law_of_a_file(stopped: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize(
     "text, name, said",
     [
-        ("    return 1.0 if reynolds > 1e9 else None", "odd", "returns None, which is no number"),
-        ("    return str(reynolds)", "odd", "which is no number"),
+        ("    return 1.0 if reynolds > 1e9 else None", "odd", "returns None, which is not a number"),
+        ("    return str(reynolds)", "odd", "which is not a number"),
         ("    return [1.0][int(reynolds) + 1]", "odd", "odd fails (list index out of range)"),
         ("    return 1.0", "not_there", "declares none of this name"),
         (
