@@ -47,10 +47,10 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.particles.material_pairs import pair_table as pair_table
     from cfddem.particles.solver import ParticleSolver as ParticleSolver
     from cfddem.particles.state import make_particles as make_particles
+    from cfddem.particles.walls.meshes import Mesh as Mesh
     from cfddem.particles.walls.shapes import Box as Box
     from cfddem.particles.walls.shapes import Cone as Cone
     from cfddem.particles.walls.shapes import Cylinder as Cylinder
-    from cfddem.particles.walls.shapes import Mesh as Mesh
     from cfddem.particles.walls.shapes import Plane as Plane
     from cfddem.preflight.summary import Preflight as Preflight
     from cfddem.run.check import check as check
@@ -88,7 +88,7 @@ _MODULES = {
     "make_particles": "cfddem.particles.state",
     "Material": "cfddem.case.materials",
     "measure": "cfddem.run.history",
-    "Mesh": "cfddem.particles.walls.shapes",
+    "Mesh": "cfddem.particles.walls.meshes",
     "NoSlip": "cfddem.fluid.conditions",
     "open_run": "cfddem.io.reading",
     "open_sweep": "cfddem.studies.sweep",

@@ -15,7 +15,8 @@ from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, make_particles
-from cfddem.particles.walls.shapes import Box, Mesh
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Box
 
 KINDS = ("dry", "film", "polydisperse", "moving_mesh")
 DIAMETER, STEP = 1e-3, 2e-6

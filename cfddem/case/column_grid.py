@@ -12,11 +12,11 @@ from cfddem.case.patches import CasePatch
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import CaseVessel
 from cfddem.case.vessel_surface import surface_in
-from cfddem.case.wall_geometry import solid_part, stamp, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
 from cfddem.fluid.thin_walls import divided, thin_wall
+from cfddem.particles.walls.stl import stamp
 
 
 def grid_of(case: CaseTables) -> Grid:
@@ -39,7 +39,7 @@ def _in_vessel(
 ) -> Grid:
     surface: Any = with_openings(surface_in(vessel, column), column, openings) if vessel else None
     if thin:
-        surface = divided(thin_wall(*(triangles(wall) for wall in thin)), surface)
+        surface = divided(thin_wall(*(wall.form.corners() for wall in thin)), surface)
     return within(Grid.of_size(column.size, column.cell), surface)
 
 
@@ -77,6 +77,6 @@ def _closed_by(wall: CaseWall) -> Region:
 
     def inside(x: Array, y: Array, z: Array) -> np.ndarray:
         points = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
-        return solid_part(wall, points.reshape(-1, 3)).reshape(points.shape[:-1])
+        return wall.closes(points.reshape(-1, 3)).reshape(points.shape[:-1])
 
     return inside

@@ -107,6 +107,12 @@ def _add(case: type[BaseModel], table: type[FeatureTable]) -> None:
     case.model_rebuild(force=True)
 
 
+def rebuild_cases() -> None:
+    """Let the schemas know new keys of their tables."""
+    for case in _CASES:
+        case.model_rebuild(force=True)
+
+
 def forget_table(name: str) -> None:
     """Remove a user's table from all cases."""
     _OWNED.remove(name)

@@ -46,7 +46,7 @@ def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
             if wall.solid is not None:
                 yield InputError(f"{key}.solid", wall.solid, "left out in a case without a fluid")
             continue
-        if wall.is_open and wall.solid is None:
+        if wall.solid is None and wall.form.is_open:
             remedy = "thin keeps the fluid on both sides; else give the side whose cells are solid"
             yield InputError(
                 f"{key}.solid", None, "given in a case with a fluid: thin, inside, outside or none", remedy

@@ -26,7 +26,6 @@ from cfddem.case.openings import refuse_openings
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
-from cfddem.case.wall_geometry import extent
 from cfddem.case.walls import place_of, walls_in
 from closures.agitation import SHARES, TIMES, AgitationFactors, free_spheres
 from closures.kinds import BUILT_IN
@@ -91,7 +90,7 @@ class Case(CaseTables):
     @model_validator(mode="after")
     def _thin_walls_end_before_periodic_sides(self) -> Case:
         for n, wall in enumerate(self.wall):
-            reach = extent(wall) if wall in self.thin_walls and wall.shape != "surface" else None
+            reach = wall.form.extent() if wall in self.thin_walls and wall.file is None else None
             if reach is None:  # the grid refuses a surface, once its file is read
                 continue
             for d, length in enumerate(self.column.size):

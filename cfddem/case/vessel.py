@@ -15,17 +15,10 @@ from cfddem.case.bed import Point
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import Line
 from cfddem.case.vessel_surface import start_box_in, surface_in
-from cfddem.case.wall_geometry import (
-    Array,
-    distance,
-    encloses,
-    inside_surface,
-    solid_part,
-    stamp,
-    triangles,
-)
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.triangles import signed_volume
+from cfddem.model.triangles import Array, inside_surface
+from cfddem.particles.walls.stl import stamp
 
 Side = Literal["inside", "outside", "behind"]
 
@@ -96,9 +89,9 @@ def on_the_wrong_side(case: CaseTables, number: int, positions: Array) -> tuple[
     positions  of the particles (N, 3) [m]
     """
     wall = case.wall[number]
-    if wall.shape != "surface" or not len(positions) or not encloses(wall):
+    if not len(positions) or not wall.form.encloses:
         return None
-    corners = triangles(wall)
+    corners = wall.form.corners()
     wanted = belongs_inside(case, wall, corners, positions)
     wrong = np.flatnonzero(inside_surface(corners, positions) != wanted)
     if not len(wrong):
@@ -121,9 +114,9 @@ def start_behind_a_surface(case: CaseTables, count: int) -> tuple[str, str, str]
         return None
     places = start_places(case)
     for number, wall in enumerate(case.wall):
-        if wall.shape != "surface" or not encloses(wall):
+        if not wall.form.encloses:
             continue
-        corners = triangles(wall)
+        corners = wall.form.corners()
         wanted = belongs_inside(case, wall, corners, places)
         wrong = inside_surface(corners, places) != wanted
         for axis in range(3):  # places closer to the surface than a radius stay empty
@@ -210,12 +203,13 @@ def vessel_of(case: CaseTables) -> Vessel | None:
     if case.vessel and not case.vessel.is_round:
         surface_in(case.vessel, case.column)  # refuses a surface that is no vessel
     try:
-        closing = tuple((wall, side) for wall in case.wall if (side := closed_side(case, wall)) is not None)
+        closing: tuple[tuple[CaseWall, str], ...] = tuple(
+            (wall, side) for wall in case.wall if (side := closed_side(case, wall)) is not None
+        )
         if not closing and (not case.vessel or case.vessel.is_upright):
             return None
         if case.vessel and not case.vessel.is_round:
-            sides: dict[str, Side] = {"surface": "outside", "plane": "behind"}
-            closing += tuple((wall, sides[wall.shape]) for wall in case.vessel.walls_in(case.column))
+            closing += tuple((wall, wall.solid or "behind") for wall in case.vessel.walls_in(case.column))
         vessel = _vessel(case.column, case.line, closing, tuple(stamp(wall) for wall, _ in closing))
     except (InputError, OSError, ValueError):  # reported by the checks of walls
         return None
@@ -226,18 +220,16 @@ def closed_side(case: CaseTables, wall: CaseWall) -> Side | None:
     """The side of a wall that is closed to particles at the start; None if there is none."""
     if wall.leaves_its_place:
         return None
-    if wall.shape == "surface":
-        if not encloses(wall):
-            return None
-        return "outside" if belongs_inside(case, wall, triangles(wall), start_places(case)) else "inside"
-    if not wall.is_open:
+    if wall.form.encloses:
+        return "outside" if belongs_inside(case, wall, wall.form.corners(), start_places(case)) else "inside"
+    if wall.form.side.default == "behind":
         return "behind"
-    return wall.solid if wall.solid in ("inside", "outside") else None
+    return wall.solid if wall.form.is_open and wall.solid in ("inside", "outside") else None
 
 
 @lru_cache(maxsize=8)
 def _vessel(
-    column: Column, line: Line, closing: Sequence[tuple[CaseWall, Side]], _: tuple[tuple[int, int], ...]
+    column: Column, line: Line, closing: Sequence[tuple[CaseWall, str]], _: tuple[tuple[int, int], ...]
 ) -> Vessel:
     """The vessel within a round wall, if there is one, and some walls with their closed sides; with these it is sampled
     on a lattice of places."""
@@ -252,10 +244,7 @@ def _vessel(
         away = np.hypot(*(points[:, :2] - 0.5 * np.array((width, depth))).T)
         is_open &= away < np.interp(points[:, 2], *np.array(line).T)
     for wall, side in closing:
-        if wall.shape == "surface" or wall.is_open:
-            is_open &= ~solid_part(wall.model_copy(update={"solid": side}), points)
-        else:
-            is_open &= distance(wall, points) >= 0.0
+        is_open &= ~wall.form.closes(points, side)
     levels = is_open.reshape(LEVELS, -1)
     lowest = levels[np.argmax(levels.any(axis=1))]
     above = math.pi * line[-1][1] ** 2 if line else column.floor_area

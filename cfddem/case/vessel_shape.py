@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from cfddem.backend.errors import InputError, shown
 from cfddem.case.bed import NonNegative, Point, Positive
 from cfddem.case.materials import Checked
-from cfddem.case.walls import ORIGIN, CaseWall, require_surface_file
+from cfddem.case.walls import ORIGIN, CaseWall, SurfaceFile
 
 Line = tuple[tuple[float, float], ...]
 """Heights and radii from the floor up [m]."""
@@ -63,7 +63,7 @@ class CaseVessel(Checked):
     )
     size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, from floor to lid [m]")
     turn: float = Field(0.0, description="angle by which a box is turned about its upright axis [degree]")
-    file: str | None = Field(
+    file: SurfaceFile | None = Field(
         None, description="STL, PLY or VTP file of a closed surface; its place is relative to the case file"
     )
     scale: Positive = Field(1.0, description="unit of length of the file [m]")
@@ -75,7 +75,6 @@ class CaseVessel(Checked):
         self._require_keys_of(self.shape, OWN_KEYS, NEEDED)
         if self.shape == "cylinder" and self.radius == 0.0:
             raise InputError("radius", self.radius, "above 0")
-        require_surface_file(self.file)
         if self.line:
             self._check_line()
         return self

@@ -11,9 +11,10 @@ import numpy as np
 from cfddem.backend.errors import InputError, shown
 from cfddem.case.bed import Point
 from cfddem.case.vessel_shape import ROUND_OFF, CaseVessel
-from cfddem.case.wall_geometry import Array, stamp, triangles
 from cfddem.fluid.surfaces import Plane, Surface, together, turned
 from cfddem.fluid.triangles import ClosedSurface, closed_surface, section_area, through_ends
+from cfddem.model.triangles import Array
+from cfddem.particles.walls.stl import stamp
 
 IN_MILLIMETRES = 30.0
 """Size of a surface over that of the column from which its file may be in millimetres [-]."""
@@ -61,7 +62,7 @@ def corners_in(vessel: CaseVessel, column: Any) -> Array:
     height = column.height
     if vessel.shape == "surface":
         surface_in(vessel, column)  # refuses what is no vessel
-        corners = triangles(vessel.walls_in(column)[0])
+        corners = vessel.walls_in(column)[0].form.corners()
         flat = [(np.abs(corners[:, :, 2] - level) < 1e-6 * height).all(axis=1) for level in (0.0, height)]
         return np.asarray(corners[~(flat[0] | flat[1])])
     low, high = (np.column_stack([vessel.plan_in(column), np.full(4, z)]) for z in (-0.1 * height, 1.1 * height))
@@ -104,7 +105,7 @@ def _largest_rectangle(mask: np.ndarray) -> tuple[tuple[int, int], tuple[int, in
 def _closed(vessel: CaseVessel, column: Any, _: tuple[int, int]) -> ClosedSurface:
     """The closed surface of a file, with open ends at floor and lid."""
     try:
-        corners = triangles(vessel.walls_in(column)[0])
+        corners = vessel.walls_in(column)[0].form.corners()
     except InputError as failure:
         raise InputError("vessel.file", failure.value, failure.limit, failure.remedy) from None
     size = np.array(column.size)

@@ -1,54 +1,69 @@
-"""Walls of a case beside those of the column: planes, plates, cylinders, cones and surfaces from files, at rest or
-moving."""
+"""Walls of a case beside those of the column, at rest or moving, and their files."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, model_validator
+from pydantic.fields import FieldInfo
 
-from cfddem.backend.errors import InputError, shown
+from cfddem.backend.errors import InputError
 from cfddem.case.bed import NonNegative, Point, Positive
+from cfddem.case.feature_table import rebuild_cases
 from cfddem.case.materials import Checked
+from cfddem.model.triangles import Array
+from cfddem.particles.walls.meshes import Plate, Surface
+from cfddem.particles.walls.shapes import Cone, Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 
-OWN_KEYS: Mapping[str, tuple[str, ...]] = {
-    "plane": ("normal",),
-    "plate": ("edges",),
-    "cylinder": ("axis", "radius", "length", "caps", "outside"),
-    "cone": ("axis", "radius", "top_radius", "length"),
-    "surface": ("file", "scale"),
-}
-"""Keys of each shape beside those of all walls."""
-
-NEEDED: Mapping[str, tuple[str, ...]] = {
-    "plane": (),
-    "plate": ("edges",),
-    "cylinder": ("radius",),
-    "cone": ("top_radius", "length"),
-    "surface": ("file",),
-}
-
-FORMATS = (".stl", ".ply", ".vtp")
-"""Endings of surface files."""
+if TYPE_CHECKING:
+    from cfddem.particles.walls.motion import Motion
 
 COPIES = "surfaces"
 """Folder inside a run folder with copies of the surface files of the case."""
 
-IN_PLACE = 1e-9
-"""Relative difference below which directions are equal."""
 
 ORIGIN = (0.0, 0.0, 0.0)
 
+FORMATS = (".stl", ".ply", ".vtp")
+"""Endings of surface files."""
+
+
+def _of_a_surface(file: str) -> str:
+    if Path(file).suffix.lower() not in FORMATS:
+        raise InputError("file", file, "a surface file, *.stl, *.ply or *.vtp")
+    return file
+
+
+SurfaceFile = Annotated[str, AfterValidator(_of_a_surface)]
+
+SHAPES: dict[str, type[Wall]] = {
+    "plane": Plane,
+    "plate": Plate,
+    "cylinder": Cylinder,
+    "cone": Cone,
+    "surface": Surface,
+}
+"""Shapes by their names in a case. Their fields are the keys of a case; those without a default are needed."""
+
+
+def _keys_of(kind: type[Wall]) -> dict[str, bool]:
+    """Keys of a shape beside those of all walls, and whether it needs them."""
+    own = (field for field in fields(kind) if field.name not in Wall.__dataclass_fields__)
+    return {field.name: field.default is MISSING for field in own}
+
 
 class CaseWall(Checked):
-    """A wall inside the column: a plane, a plate, a cylinder, a cone, or a surface from a file; at rest or moving."""
+    """A wall inside the column, of a shape of `SHAPES`; at rest or moving. It has the keys of all shapes."""
 
-    shape: Literal["plane", "plate", "cylinder", "cone", "surface"] = Field(description="shape of the wall")
+    shape: str = Field(description="shape of the wall")
     material: str | None = Field(None, description="material of the wall; default: that of the column")
     point: Point = Field(
         ORIGIN,
@@ -69,7 +84,7 @@ class CaseWall(Checked):
     )
     caps: bool = Field(False, description="a cylinder has flat ends; without them particles touch it from both sides")
     outside: bool = Field(False, description="particles are outside of a cylinder that is closed or has no end")
-    file: str | None = Field(
+    file: SurfaceFile | None = Field(
         None, description="STL, PLY or VTP file of a surface; its place is relative to the case file"
     )
     scale: Positive = Field(1.0, description="unit of length of the file [m]")
@@ -90,34 +105,22 @@ class CaseWall(Checked):
         "wall; none: it does. Default: the side without particles, the inside of a surface, or thin for a plate",
     )
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any: ...  # keys of a user's shape
+
     @model_validator(mode="after")
     def _keys_suit_the_shape(self) -> CaseWall:
-        self._require_keys_of(self.shape, OWN_KEYS, NEEDED)
-        for name in ("normal", "axis"):
-            if not math.hypot(*getattr(self, name)) > 0.0:
-                raise InputError(name, getattr(self, name), "a direction other than zero")
-        self._check_shape()
+        own = {name: list(_keys_of(kind)) for name, kind in SHAPES.items()}
+        needed = {
+            name: [key for key, is_needed in _keys_of(kind).items() if is_needed] for name, kind in SHAPES.items()
+        }
+        self._require_keys_of(self.shape, own, needed)
+        side = self.form.side
+        if self.solid is not None and self.solid not in side.allowed:
+            raise InputError("solid", self.solid, f"{', '.join(side.allowed)}, or left out", side.why)
         self._check_motion()
         return self
-
-    def _check_shape(self) -> None:
-        if self.shape == "cylinder":
-            if not self.radius:
-                raise InputError("radius", self.radius, "above 0")
-            if self.caps and self.length is None:
-                raise InputError("caps", True, "false where no length is given")
-            if self.outside and self.is_open:
-                raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
-        require_surface_file(self.file)
-        if self.edges and not _norm(np.cross(*np.array(self.edges))) > IN_PLACE * _norm(self.edges[0]) * _norm(
-            self.edges[1]
-        ):
-            raise InputError("edges", shown(self.edges), "two edges in different directions, in m")
-        if self.shape == "plate" and self.solid in ("inside", "outside"):
-            raise InputError("solid", self.solid, "thin, none, or left out", "a plate has no inside")
-        sided = not self.has_triangles and not self.is_open
-        if self.solid in ("inside", "outside", "thin") and sided:
-            raise InputError("solid", self.solid, "none, or left out", "the side without particles is solid")
 
     def _check_motion(self) -> None:
         oscillates, spins = any(self.amplitude), any(self.spin)
@@ -132,31 +135,25 @@ class CaseWall(Checked):
             raise InputError("begin", self.begin, "left out for a wall at rest", "give velocity, spin or amplitude")
         if self.centre is not None and not spins:
             raise InputError("centre", self.centre, "left out where there is no spin")
-        if self.shape == "plane" and not _parallel(self.spin, self.normal):
-            raise InputError("spin", self.spin, "along the normal of a plane", "use a surface for a plate that tilts")
-        if self.shape == "cylinder" and self.length is None and not self._spins_in_place:
-            raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
 
     @property
-    def has_triangles(self) -> bool:
-        """Whether the wall is made of triangles: a surface from a file, or a plate."""
-        return self.shape in ("surface", "plate")
-
-    @property
-    def radii(self) -> tuple[float, float]:
-        """Radii of the lower and upper end of a cylinder or cone [m]."""
-        own = self.radius or 0.0
-        return own, self.top_radius or own
-
-    @property
-    def is_open(self) -> bool:
-        """Whether particles touch the wall from both sides, and it has no inside."""
-        return self.shape == "cone" or (self.shape == "cylinder" and self.length is not None and not self.caps)
+    def form(self) -> Wall:
+        """The wall at the start, with the keys of its shape and its largest velocity."""
+        kind = SHAPES[self.shape]
+        own = {key: value for key in _keys_of(kind) if (value := getattr(self, key)) is not None}
+        velocity: Any = tuple((np.array(self.velocity) + self.swing).tolist())
+        return kind(velocity=velocity, spin=self.spin, centre=self.centre, **own)
 
     @property
     def is_thin(self) -> bool:
         """Whether a fluid is on both sides of the wall, and does not pass through it."""
-        return self.solid == "thin" or (self.shape == "plate" and self.solid is None)
+        return (self.solid or self.form.side.default) == "thin"
+
+    def closes(self, points: Array) -> NDArray[np.bool_]:
+        """Which points (N, 3) [m] it closes to the fluid (N,)."""
+        if self.solid == "none" or self.is_thin:
+            return np.zeros(len(points), bool)
+        return self.form.closes(points, self.solid)
 
     @property
     def moves(self) -> bool:
@@ -169,58 +166,76 @@ class CaseWall(Checked):
         return self.begin > 0.0 or self.end is not None or any(self.amplitude)
 
     @property
-    def swing(self) -> np.ndarray:
+    def swing(self) -> Array:
         """Largest velocity of the oscillation (3,) [m/s]."""
         return 2.0 * math.pi * self.frequency * np.array(self.amplitude)
 
     @property
     def leaves_its_place(self) -> bool:
         """Whether the wall sweeps through space; one that moves along itself does not."""
-        drift = np.array(self.velocity) + self.swing
-        if self.shape == "plane":
-            return not abs(float(drift @ np.array(self.normal))) <= IN_PLACE * _norm(drift) * _norm(self.normal)
-        if self.shape == "cylinder" and self.length is None:
-            return not _parallel(drift, self.axis)
-        if self.has_triangles:
-            return self.moves
-        return bool(drift.any()) or not self._spins_in_place
-
-    @property
-    def _spins_in_place(self) -> bool:
-        """Whether a spin leaves a surface of revolution unchanged."""
-        arm = np.subtract(self.point if self.centre is None else self.centre, self.point)
-        return not any(self.spin) or (_parallel(self.spin, self.axis) and _parallel(arm, self.axis))
+        return not self.form.stays
 
     @property
     def fastest(self) -> float:
         """Bound of the speed of the surface; NaN for the spin of a surface from a file, which is not read [m/s]."""
-        turning = 0.0
-        if any(self.spin):
-            arm = np.subtract(self.point if self.centre is None else self.centre, self.point)
-            reach = max(self.radii) + (self.length or 0.0) * (not self._spins_in_place)
-            across = _norm(arm) * (not self._spins_in_place)
-            turning = _norm(self.spin) * (reach + across) if self.shape in ("cylinder", "cone") else math.nan
-            turning = 0.0 if self.shape == "plane" else turning
-        return _norm(self.velocity) + _norm(self.swing) + turning
+        return math.hypot(*self.velocity) + math.hypot(*self.swing) + self.form.speed_of_spin()
+
+    def motion(self, number: int = 0) -> Motion:
+        """Its motion, as of a wall of this number of a particle solver."""
+        from cfddem.particles.walls.motion import Motion  # loads the compiler, which checks lack
+
+        end = math.inf if self.end is None else self.end
+        return Motion(number, self.velocity, self.spin, self.amplitude, self.frequency, self.begin, end)
+
+    def particle_wall(self, material: int, key: str) -> Wall:
+        """The wall that particles touch.
+
+        material  row of the pair table
+        key       of the wall in the case, for errors
+        """
+        try:
+            return replace(self.form, material=material).for_particles()
+        except InputError as failure:
+            raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None
 
 
-def _norm(vector: Sequence[float] | np.ndarray) -> float:
-    return math.hypot(*vector)
+def register(name: str, kind: type[Wall], **keys: Any) -> None:
+    """Let cases have a shape of a user by its name, as `shape = "ring"`.
+
+    name  in cases
+    kind  class of the wall, whose fields are keys of the case
+    keys  type and description of those that no other shape has: `Annotated[float, Field(gt=0, description="... [m]")]`
+    """
+    SHAPES[name] = kind
+    for key, annotation in keys.items():
+        description = FieldInfo.from_annotation(annotation).description
+        CaseWall.__pydantic_fields__[key] = FieldInfo(
+            annotation=annotation | None, default=None, description=description
+        )
+        CaseWall.__annotations__[key] = annotation | None
+    _declare()
 
 
-def _parallel(one: Sequence[float] | np.ndarray, other: Sequence[float] | np.ndarray) -> bool:
-    """Whether two vectors have the same axis; a vector of length 0 has any."""
-    across = _norm(np.cross(np.array(one, float), np.array(other, float)))
-    return across <= IN_PLACE * _norm(one) * _norm(other)
+def forget_shape(name: str) -> None:
+    """Remove a user's shape from all cases; its keys stay, without a shape."""
+    del SHAPES[name]
+    _declare()
+
+
+def _declare() -> None:
+    """Let the schema of a case know the shapes."""
+    named: Any = Literal.__getitem__(tuple(SHAPES))  # type: ignore[attr-defined]
+    description = CaseWall.model_fields["shape"].description
+    CaseWall.__annotations__["shape"] = named
+    CaseWall.__pydantic_fields__["shape"] = FieldInfo(annotation=named, description=description)
+    CaseWall.model_rebuild(force=True)
+    rebuild_cases()
+
+
+_declare()
 
 
 # ---------------------------------------------------------------- surface files
-
-
-def require_surface_file(file: str | None) -> None:
-    """Raise InputError for a file whose ending is not that of a surface."""
-    if file is not None and Path(file).suffix.lower() not in FORMATS:
-        raise InputError("file", file, "a surface file, *.stl, *.ply or *.vtp")
 
 
 def copy_of(folder: Path, name: str, file: str) -> Path:

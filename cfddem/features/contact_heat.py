@@ -21,7 +21,6 @@ import numpy as np
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import serial
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import triangles
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
 from cfddem.features.heat import LEAST, mean_temperature
@@ -255,7 +254,7 @@ class HeatExchangeOfContacts(CaseFeature):
         self.capacities = _capacities(case, keys)
         self.emissivities = keys.by_material(case, "emissivity", 0.0)
         self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
-        thin = [triangles(wall) for wall in case.wall if wall.is_thin]  # also without a fluid
+        thin = [wall.form.corners() for wall in case.wall if wall.is_thin]  # also without a fluid
         self._thin = thin_wall(*thin) if thin else None
         self.from_walls, self.radiated, self.gained, self.scale = 0.0, 0.0, 0.0, 0.0
         self.total_capacity, self._step = float(simulation.communicator.sum(self.capacity(simulation.owned))), 0.0

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from cfddem.backend.errors import InputError
 from cfddem.fluid.grid import Array
 from cfddem.fluid.surfaces import Surface
-from cfddem.fluid.triangles import edges_of, normals_of, sorted_into_boxes, with_area
+from cfddem.fluid.triangles import normals_of, sorted_into_boxes, with_area
+from cfddem.model.triangles import edges_of
 
 FAR = 1e6
 """Distance of a wall that is not there [m]."""

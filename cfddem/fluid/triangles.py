@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
+from cfddem.model.triangles import edges_of
 
 Array = NDArray[np.float64]
 
@@ -156,18 +157,6 @@ def through_ends(corners: Array, height: float, reach: float) -> Array:
         sides = [np.stack([a, b, b_out], axis=1), np.stack([a, b_out, a_out], axis=1)]
         corners = np.concatenate([corners[~flat], moved, *sides])
     return corners
-
-
-def edges_of(corners: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Numbers of the corners (T, 3); edges (E, 2), the lower number first; and how many triangles have each edge in
-    this direction and in the other (E, 2)."""
-    names = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
-    begin, after = names.ravel(), np.roll(names, -1, axis=1).ravel()
-    ordered = np.stack([np.minimum(begin, after), np.maximum(begin, after)], axis=1)
-    edges, which = np.unique(ordered, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    count = [np.bincount(which, weights=way, minlength=len(edges)) for way in (begin < after, begin > after)]
-    return names, edges, np.stack(count, axis=1).astype(np.int64)
 
 
 def _parts(names: NDArray[np.int64]) -> list[NDArray[np.int64]]:

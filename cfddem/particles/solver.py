@@ -33,7 +33,7 @@ from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
 from cfddem.particles.walls.mesh_contacts import pairs_at_walls, wall_contacts
-from cfddem.particles.walls.shapes import Wall
+from cfddem.particles.walls.wall import Wall
 
 CHECK_EVERY = 20
 """The time step is checked again at every this many neighbour lists."""

@@ -14,7 +14,6 @@ from cfddem.case.liquid import Spray
 from cfddem.case.openings import outline
 from cfddem.case.patches import ENDS, PLANES, CasePatch, lengths_of, middle_of
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import direction, extent, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -47,7 +46,7 @@ def case_drawing(case: Case, bed_height: float | None = None) -> Figure:
     _cells(axes, case)
     _particles(axes, case)
     for wall in (*case.wall, *(case.vessel.walls_in(case.column) if case.vessel else ())):
-        _wall(axes, wall, width, height)
+        _wall(axes, wall, 2.0 * max(width, height))
     for boxes, name, colour in ((case.feed, "feed", GREEN), (case.outlet, "outlet", RED)):
         for box in boxes:
             _box(axes, box.corner, box.size, name, colour)
@@ -227,48 +226,19 @@ def _spray(axes: Axes, spray: Spray) -> None:
 OUTLINE: dict[str, Any] = {"color": "#222222", "linewidth": 1.6}
 
 
-def _wall(axes: Axes, wall: CaseWall, width: float, height: float) -> None:
-    """The outline of a wall as seen along y."""
-    if wall.has_triangles:
-        _surface(axes, wall)
-    elif wall.shape == "plane":
-        (nx, _, nz), (px, _, pz) = wall.normal, wall.point
-        if abs(nx) + abs(nz) > 0.0:
-            axes.axline((px, pz), (px - nz, pz + nx), **OUTLINE)
-    else:
-        _round(axes, wall, 2.0 * max(width, height))
-
-
-def _surface(axes: Axes, wall: CaseWall) -> None:
-    """Edges of triangles; nothing of a surface that cannot be read, because the check of the case says so."""
-    try:
-        corners = triangles(wall)[:MOST_TRIANGLES, :, ::2]
-    except CfddemError:
-        return
-    for triangle in corners:
-        axes.fill(*triangle.T, facecolor=GREY, alpha=0.15, edgecolor=GREY, linewidth=0.3)
-
-
-def _round(axes: Axes, wall: CaseWall, far: float) -> None:
-    """Sides and caps of a cone or cylinder, or its circle if seen along its axis.
+def _wall(axes: Axes, wall: CaseWall, far: float) -> None:
+    """A wall as seen along y; nothing of one that cannot be read, because the check of the case says so.
 
     far  length of a wall without ends, to each side [m]
     """
-    axis, begin = direction(wall)[::2], np.array(wall.point)[::2]
-    if math.hypot(*axis) < 0.5 and extent(wall) is not None:
-        angle = np.linspace(0.0, 2.0 * math.pi, 100)
-        axes.plot(begin[0] + wall.radii[0] * np.cos(angle), begin[1] + wall.radii[0] * np.sin(angle), **OUTLINE)
+    try:
+        lines, areas = wall.form.sketch(far)
+    except CfddemError:
         return
-    end = begin + (wall.length or far) * axis
-    if wall.length is None:
-        begin = begin - far * axis
-    normal = np.array([-axis[1], axis[0]])
-    low, high = wall.radii
-    for side in (-1.0, 1.0):
-        axes.plot(*zip(begin + side * low * normal, end + side * high * normal), **OUTLINE)
-    if wall.caps:
-        for centre, size in zip((begin, end), wall.radii):
-            axes.plot(*zip(centre - size * normal, centre + size * normal), **OUTLINE)
+    for line in lines:
+        axes.plot(*line.T, **OUTLINE)
+    for area in areas[:MOST_TRIANGLES]:
+        axes.fill(*area.T, facecolor=GREY, alpha=0.15, edgecolor=GREY, linewidth=0.3)
 
 
 def _facts(case: Case) -> list[str]:

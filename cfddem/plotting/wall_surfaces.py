@@ -10,16 +10,11 @@ import numpy as np
 
 from cfddem.analysis.report import case_of
 from cfddem.backend.errors import CfddemError
-from cfddem.case.wall_geometry import circle, direction, extent, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.io.reading import RunData
-from cfddem.particles.walls.motion import Motion
 
 COLOUR, OPACITY, EDGE = "#6b6b6b", 0.18, "#3c3c3c"
 """Colour of a wall, its opacity, and the colour of its edges."""
-
-AROUND = 72
-"""Edges of a drawn circle."""
 
 SHARP = 25.0
 """Angle between two triangles from which their common edge is drawn [degrees]."""
@@ -39,7 +34,7 @@ def with_walls(bounds: np.ndarray, run: RunData) -> np.ndarray:
     """Bounds (3, 2) [m] that also hold the walls of a run, as far as these have ends and lie in the column."""
     try:
         case = case_of(run)
-        boxes = [box for wall in case.wall if (box := extent(wall)) is not None]
+        boxes = [box for wall in case.wall if (box := wall.form.extent()) is not None]
     except CfddemError:
         return bounds
     low, high = bounds.T
@@ -77,50 +72,22 @@ def _surface(wall: CaseWall, bounds: np.ndarray) -> Any:
     """The surface of a wall at the start; one without an end reaches beyond the bounds."""
     import pyvista
 
-    point, middle = np.array(wall.point), bounds.mean(axis=1)
-    far = 2.0 * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0])) + float(np.linalg.norm(middle - point))
-    if wall.has_triangles:
-        corners = triangles(wall)
-        return _polygons(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)).clean()
-    if wall.shape == "plane":
-        return pyvista.Plane(point, wall.normal, far, far, 1, 1)
-    low, high = (0.0, wall.length) if wall.length is not None else (-far, far)
-    return _round(point, direction(wall), (low, high), wall.radii, wall.caps)
-
-
-def _round(
-    point: np.ndarray, axis: np.ndarray, ends: tuple[float, float], radii: tuple[float, float], caps: bool
-) -> Any:
-    """A surface of revolution about an axis of unit length between two circles."""
-    around = circle(axis, AROUND)
-    points = np.concatenate([point + end * axis + radius * around for end, radius in zip(ends, radii)])
-    here, after = np.arange(AROUND), np.roll(np.arange(AROUND), -1)
-    faces = np.stack([here, after, after + AROUND, here + AROUND], axis=1)
-    side = _polygons(points, faces)
-    if not caps:
-        return side
-    discs = _polygons(points, np.arange(2 * AROUND).reshape(2, AROUND))
-    return side.append_polydata(discs)
-
-
-def _polygons(points: np.ndarray, faces: np.ndarray) -> Any:
-    """A surface of polygons with equally many corners."""
-    import pyvista
-
+    middle = bounds.mean(axis=1)
+    far = 2.0 * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0])) + float(np.linalg.norm(middle - wall.form.middle()))
     make: Any = pyvista.PolyData.from_regular_faces
-    return make(points, faces)
+    first, *others = (
+        make(faces.reshape(-1, 3), np.arange(faces.shape[0] * faces.shape[1]).reshape(faces.shape[:2]))
+        for faces in wall.form.polygons(far)
+    )
+    return first.append_polydata(*others).clean() if others else first.clean()
 
 
 def _moved(mesh: Any, wall: CaseWall, time: float) -> Any:
     """A surface of the start at a later time."""
     if not wall.moves:
         return mesh
-    end = math.inf if wall.end is None else wall.end
-    motion = Motion(0, wall.velocity, wall.spin, wall.amplitude, wall.frequency, wall.begin, end)
+    motion = wall.motion()
     if any(wall.spin):
-        middle = np.array(wall.point) + 0.5 * (wall.length or 0.0) * direction(wall)
-        if wall.has_triangles:
-            middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
         turned = math.degrees(math.hypot(*wall.spin) * motion.active(time))
-        mesh = mesh.rotate_vector(wall.spin, turned, point=middle if wall.centre is None else wall.centre)
+        mesh = mesh.rotate_vector(wall.spin, turned, point=wall.form.middle() if wall.centre is None else wall.centre)
     return mesh.translate(motion.displacement(time))

@@ -14,7 +14,7 @@ from cfddem.case.materials import NO_FLUID
 from cfddem.case.patches import open_area_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import Vessel, floor_places, vessel_of
-from cfddem.case.wall_geometry import Array
+from cfddem.model.triangles import Array
 from closures import balance, drag_single, numbers
 from closures.balance import Drag
 from closures.drag import ergun

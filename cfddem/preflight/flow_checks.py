@@ -188,8 +188,8 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     if not case.has_fluid:
         yield Issue("warning", "laws.wall_drag", "unused, because the case has no fluid", "leave it out")
     for number, wall in enumerate(case.wall):
-        if wall.has_triangles or wall.moves:
-            reason = f"is a {wall.shape}" if wall.has_triangles else "moves"
+        if not wall.form.exact or wall.moves:
+            reason = "moves" if wall.form.exact else f"is a {wall.shape}"
             yield Issue("error", "laws.wall_drag", f"wall.{number} {reason}", 'set laws.wall_drag = "none"')
     if case.vessel and case.vessel.shape == "surface":
         reason = "the vessel is a surface from a file"

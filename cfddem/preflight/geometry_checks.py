@@ -12,7 +12,6 @@ from cfddem.backend.errors import InputError
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
 from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, vessel_of
-from cfddem.case.wall_geometry import triangles
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, Severity, percent
 
@@ -198,10 +197,10 @@ def check_scales(case: Case) -> Iterator[Issue]:
     """Check that no surface file is so large that it may be in mm; an error where none of it lies in the column."""
     size = np.array(case.column.size)
     for number, wall in enumerate(case.wall):
-        if wall.shape != "surface" or wall.scale != 1.0:
+        if wall.file is None or wall.scale != 1.0:
             continue
         try:
-            corners = triangles(wall)
+            corners = wall.form.corners()
         except (InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
             continue
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))

@@ -14,9 +14,9 @@ from cfddem.backend.tables import line_width
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
-from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
+from cfddem.model.triangles import is_closed
 from cfddem.preflight.accuracy import accuracy
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
@@ -167,12 +167,12 @@ def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
 def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group, counts = "walls and feeds", cell_counts(case.column.size, case.column.cell)
     for number, wall in enumerate(case.wall):
-        if wall.shape == "surface":
+        if wall.file is not None:
             yield Row(group, f"wall {number}: triangles", *_surface(wall))
-        upright = wall.is_open and wall.axis[:2] == (0.0, 0.0)
-        if wall in case.thin_walls and upright and counts[0] * counts[1] <= MOST_CELLS:
+        circle = wall.form.circle_half_way_up()
+        if circle and wall in case.thin_walls and counts[0] * counts[1] <= MOST_CELLS:
             note = "over the true one, half way up: the fluid sees steps; choose a radius that has it near 1"
-            yield Row(group, f"wall {number}: area by its cells", area_by_cells(case, wall), "", note)
+            yield Row(group, f"wall {number}: area by its cells", area_by_cells(case, *circle), "", note)
         if wall.moves and math.isfinite(wall.fastest):
             yield Row(group, f"wall {number}: largest speed", wall.fastest, "m/s", wall.shape)
     for number, feed in enumerate(case.feed):
@@ -210,7 +210,7 @@ def _cut_cells(case: Case, group: str) -> Iterator[Row]:
 def _surface(wall: CaseWall) -> tuple[float, str, str]:
     """Number of triangles, unit, and whether they enclose a volume."""
     try:
-        corners = triangles(wall)
+        corners = wall.form.corners()
     except (InputError, OSError, ValueError):  # reported as an error
         return math.nan, "", ""
     closed = is_closed(corners)

@@ -14,18 +14,10 @@ from cfddem.backend.errors import InputError
 from cfddem.case.bed import POURED_SOLID_FRACTION, CaseFeed, Point
 from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import (
-    corners_of,
-    distance,
-    extent,
-    inside_surface,
-    is_closed,
-    solid_part,
-    triangles,
-)
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.fluid.triangles import signed_volume
+from cfddem.model.triangles import corners_of, inside_surface, is_closed
 from cfddem.preflight.issue import Issue, Severity, percent
 
 MANY_TRIANGLES, MOST_TRIANGLES, LARGEST_FILE = 200_000, 2_000_000, 1_000_000_000
@@ -69,19 +61,18 @@ def check_walls_and_feeds(case: Case) -> Iterator[Issue]:
 
 
 def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
-    if wall.shape == "surface":
+    if wall.file is not None:
         issues = list(_check_surface(case, wall, key))
         yield from issues
         if any(issue.severity == "error" for issue in issues):
             return
-    yield from _check_place(case, wall, key)
-    ends = dict(zip(("radius", "top_radius"), wall.radii))
-    narrow = min(ends, key=lambda end: ends[end])
-    opening = 2.0 * ends[narrow] if wall.shape == "cone" and wall.solid != "inside" else 0.0
-    if 0.0 < opening < case.bed.largest_diameter:
+    for severity, word, reason, remedy in wall.form.misplaced(np.array(case.column.size)):
+        yield Issue(severity, f"{key}.{word}", reason, remedy)
+    narrow, width = wall.form.opening or ("", 0.0)
+    if wall.solid != "inside" and 0.0 < width < case.bed.largest_diameter:
         yield Issue(
             "warning", f"{key}.{narrow}",
-            f"an opening of {opening:.3g} m is narrower than a particle, {case.bed.largest_diameter:.3g} m",
+            f"an opening of {width:.3g} m is narrower than a particle, {case.bed.largest_diameter:.3g} m",
             "use a larger radius; below about five diameters particles form arches",
         )  # fmt: skip
     if wall.moves and wall.has_schedule and wall.begin >= case.run.until:
@@ -91,7 +82,8 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
             "set it to the speed of the tip, if that is the fastest",
         )  # fmt: skip
-    if wall in case.thin_walls and wall.is_open and (across := cells_across(case, wall)) < FEWEST_ACROSS:
+    across = width / max(case.column.cell_edges)
+    if wall.form.opening and wall in case.thin_walls and across < FEWEST_ACROSS:
         reason = f"{across:.2g} cells across the opening; its flow needs at least {FEWEST_ACROSS:g}"
         yield Issue(
             "warning", f"{key}.{narrow}", reason, "use smaller cells, but of at least 2 diameters, or a wider wall"
@@ -102,23 +94,18 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "the fluid does not feel the motion of a wall: at its cells the velocity is 0",
             "the motion acts on particles that touch the wall",
         )  # fmt: skip
-    if any(case.column.periodic) and not _repeats(case, wall):
+    if any(case.column.periodic) and not wall.form.repeats(np.array(case.column.periodic)):
         yield Issue(
             "error", key, f"a {wall.shape} is not the same all along the periodic sides of the column",
             'set column.sides or column.front to "no_slip"; only planes and endless cylinders along them repeat',
         )  # fmt: skip
 
 
-def cells_across(case: Case, wall: CaseWall) -> float:
-    """Cells across the narrowest part of an open wall."""
-    return 2.0 * min(wall.radii) / max(case.column.cell_edges)
-
-
-def area_by_cells(case: Case, wall: CaseWall) -> float:
-    """Area of the cells whose centres an upright thin wall holds half way up, over its own [-]."""
-    counts, radius = cell_counts(case.column.size, case.column.cell), 0.5 * sum(wall.radii)
+def area_by_cells(case: Case, middle_x: float, middle_y: float, radius: float) -> float:
+    """Area of the cells whose centres a circle holds [m], over its own [-]."""
+    counts = cell_counts(case.column.size, case.column.cell)
     x, y = ((np.arange(n) + 0.5) * length / n for n, length in zip(counts[:2], case.column.size))
-    inside = np.hypot(x[None, :] - wall.point[0], y[:, None] - wall.point[1]) < radius
+    inside = np.hypot(x[None, :] - middle_x, y[:, None] - middle_y) < radius
     cells = float(np.count_nonzero(inside)) * case.column.size[0] * case.column.size[1] / (counts[0] * counts[1])
     return cells / (math.pi * radius**2)
 
@@ -129,7 +116,7 @@ def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         size = Path(wall.file or "").stat().st_size
         if size > LARGEST_FILE:
             raise InputError("file", wall.file, f"at most {LARGEST_FILE / 1e9:g} GB")
-        corners = triangles(wall)
+        corners = wall.form.corners()
     except (InputError, OSError, ValueError) as failure:
         why = failure.strerror if isinstance(failure, OSError) else str(failure).partition(": ")[2] or str(failure)
         yield Issue("error", f"{key}.file", f"{wall.file}: {why}", "paths are relative to the case file")
@@ -171,26 +158,6 @@ def _check_vessel(case: Case, wall: CaseWall, key: str, corners: np.ndarray) -> 
         )  # fmt: skip
 
 
-def _check_place(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
-    """Check that a wall lies in the column."""
-    size = np.array(case.column.size)
-    box = extent(wall)
-    if box is not None:
-        if (box[0] > size).any() or (box[1] < 0.0).any():
-            low, high = (", ".join(f"{coordinate:.4g}" for coordinate in corner) for corner in box)
-            yield Issue(
-                "error", f"{key}.point", f"the wall, from ({low}) to ({high}) m, lies outside the column",
-                f"the column extends from 0 to {case.column.size} m",
-            )  # fmt: skip
-        return
-    if wall.shape == "plane":
-        away = distance(wall, corners_of(np.zeros(3), size))
-        if away.max() <= 0.0:
-            yield Issue("error", f"{key}.normal", "the whole column lies behind the plane", "reverse the normal")
-        elif away.min() >= 0.0 and not wall.leaves_its_place:
-            yield Issue("warning", f"{key}.point", "the plane does not cut the column", "move it into the column")
-
-
 def _check_cells(case: Case) -> Iterator[Issue]:
     """Check which cells the walls close to the fluid."""
     closed = closed_cells(case)
@@ -225,7 +192,7 @@ def closed_cells(case: Case) -> dict[int, np.ndarray]:
     closed = {}
     for number, wall in closing.items():
         with suppress(InputError, OSError):  # a surface that cannot be read, or is open, is reported elsewhere
-            closed[number] = solid_part(wall, centres.reshape(-1, 3)).reshape(x.shape)
+            closed[number] = wall.closes(centres.reshape(-1, 3)).reshape(x.shape)
     return closed
 
 
@@ -246,20 +213,10 @@ def leaking_share(case: Case, wall: CaseWall, closed: dict[int, np.ndarray]) -> 
         starts = np.take(centres, range(shape[axis] - 1), axis)[here & there]
         within = np.zeros(len(starts), bool)
         for part in (np.arange(BETWEEN) + 0.5) / BETWEEN:
-            within |= solid_part(wall, starts + part * steps * np.eye(3)[axis])
+            within |= wall.closes(starts + part * steps * np.eye(3)[axis])
         leaking, stopped = float(within.sum()), 0.5 * float((here ^ there).sum())  # a line enters and leaves the wall
         worst = max(worst, leaking / max(leaking + stopped, 1.0))
     return worst
-
-
-def _repeats(case: Case, wall: CaseWall) -> bool:
-    """Whether a wall is the same in every periodic image of the column."""
-    periodic = case.column.periodic
-    if wall.shape == "plane":
-        return not any(part for part, repeats in zip(wall.normal, periodic) if repeats)
-    if wall.shape == "cylinder" and wall.length is None:
-        return sum(periodic) == 1 and not any(part for part, repeats in zip(wall.axis, periodic) if not repeats)
-    return False
 
 
 # ---------------------------------------------------------------- feeds and outlets
@@ -290,7 +247,7 @@ def free_share(case: Case, corner: Point, size: Point, radius: float) -> float:
     places = np.array(corner) + np.random.default_rng(1).uniform(size=(SAMPLES, 3)) * np.array(size)
     free = np.ones(SAMPLES, bool)
     for wall in case.wall:
-        away = distance(wall, places)
+        away = wall.form.distance(places)
         free &= ~(away < radius)
     free &= case.beyond_the_side(places, radius) < 0.0
     return float(np.count_nonzero(free)) / SAMPLES
@@ -335,6 +292,6 @@ def _unreachable(case: Case, corner: Point, size: Point) -> bool:
     low = np.array(corner)
     places = np.concatenate([corners_of(low, low + np.array(size)), [low + 0.5 * np.array(size)]])
     for wall in case.wall:
-        if not wall.leaves_its_place and (distance(wall, places) < 0.0).all() and not wall.is_open:
+        if not wall.leaves_its_place and (wall.form.distance(places) < 0.0).all():
             return True
     return bool((case.beyond_the_side(places) > 0.0).all())

@@ -45,7 +45,9 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.neighbours import wrap
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
-from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Turned, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Cylinder, Plane, Turned
+from cfddem.particles.walls.wall import Wall
 from cfddem.run.division import cells_of, space_of
 from cfddem.run.initial_particles import particles_of
 from cfddem.run.patches import with_patches

@@ -22,7 +22,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.state import Particles
 from cfddem.particles.state import make_particles as make_bodies
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
-from cfddem.particles.walls.shapes import Wall
+from cfddem.particles.walls.wall import Wall
 from cfddem.preflight.bed_estimate import estimate_bed
 
 LARGEST_EXPANDED_FRACTION = 0.55

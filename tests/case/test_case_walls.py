@@ -13,8 +13,8 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import distance, extent, inside_surface
 from cfddem.case.walls import CaseWall
+from cfddem.model.triangles import inside_surface
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.walls.motion import Motion
 from cfddem.particles.walls.stl import read_stl
@@ -273,8 +273,8 @@ def test_distances_are_those_of_the_shapes() -> None:
         (CaseWall(**rod, caps=True, outside=True), [-0.5, 1.0, 1.0, corner]),
         (CaseWall(shape="cone", radius=1.0, top_radius=1.0, length=1.0), [0.5, 1.0, math.sqrt(2.0), corner]),
     ):
-        assert distance(wall, points) == pytest.approx(expected), wall
-    box = extent(CaseWall(shape="cylinder", radius=1.0, length=2.0, axis=(0.0, 1.0, 0.0)))
+        assert wall.form.distance(points) == pytest.approx(expected), wall
+    box = CaseWall(shape="cylinder", radius=1.0, length=2.0, axis=(0.0, 1.0, 0.0)).form.extent()
     assert box is not None and box.tolist() == [[-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]]
 
 

@@ -12,7 +12,6 @@ from test_vessel import TEXT
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import extent, triangles
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
@@ -45,7 +44,7 @@ def test_a_tube_and_a_plate_close_faces_and_no_cells():
         plate = grid.inner(cut.thin[1])[10:15] > 0.0
         assert plate.any() and set(np.unique(np.nonzero(plate)[1])) == {8}
         assert (case.closes_cells(case.wall[0]), case.closes_cells(case.wall[1])) == (False, False)
-        assert np.allclose(extent(case.wall[1]), [[0.0, 0.083, 0.1], [0.16, 0.083, 0.15]])
+        assert np.allclose(case.wall[1].form.extent(), [[0.0, 0.083, 0.1], [0.16, 0.083, 0.15]])
         assert not [each for each in preflight(case).issues if each.severity == "error"]
 
 
@@ -58,7 +57,7 @@ def test_particles_touch_a_plate_from_both_sides():
 
 def test_a_cone_of_triangles_has_its_ends():
     cone = made({**TUBE, "shape": "cone", "top_radius": 0.04}).wall[0]
-    corners = triangles(cone).reshape(-1, 3)
+    corners = cone.form.corners().reshape(-1, 3)
     away = np.hypot(corners[:, 0] - 0.08, corners[:, 1] - 0.08)
     assert np.allclose(away, np.where(corners[:, 2] > 0.05, 0.04, 0.026))
 

@@ -10,7 +10,8 @@ import numpy as np
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.walls.shapes import Plane, Wall
+from cfddem.particles.walls.shapes import Plane
+from cfddem.particles.walls.wall import Wall
 from golden.building import own_law, particles
 from golden.registry import State, golden
 from golden.states import particle_state

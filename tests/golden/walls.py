@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 from golden.building import particles
 from golden.many_particles import after
 from golden.registry import State, golden

@@ -28,7 +28,9 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, make_particles
-from cfddem.particles.walls.shapes import Box, Mesh, Plane, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Box, Plane
+from cfddem.particles.walls.wall import Wall
 from cfddem.run import history
 from cfddem.run.wall_loads import loads_of_particles
 

@@ -1,38 +1,48 @@
-"""A wall shape of a user, as docs/how-to/own-wall.md writes it: of exact pieces, and of triangles in a case."""
+"""A wall shape of a user, as docs/how-to/own-wall.md writes it: of a solver, in a case, and as a surface file."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import call
 
+from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
 from cfddem.case.materials import Material
+from cfddem.case.schema import Case
+from cfddem.case.walls import forget_shape
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Mesh, Wall
+from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.stl import read_stl
+from cfddem.particles.walls.wall import Wall
+from cfddem.plotting.case_drawing import case_drawing
+from cfddem.preflight.summary import preflight
 from cfddem.run.simulation import Simulation
 from closures import contact
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "own-wall.md").read_text(encoding="utf-8")
-SHAPE, BEADS, CASE = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+SHAPE, BEADS, CASE, FILE = re.findall(r"```python\n(.*?)```", PAGE, re.S)
 RADIUS, HEIGHT, INNER, OUTER = 1e-3, 0.01, 0.002, 0.006
 GLASS = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.5, friction=0.3)
 
 
 @pytest.fixture
-def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """Names of the page, run in an empty folder."""
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
-    for block in (SHAPE, BEADS, CASE):
+    for block in (SHAPE, BEADS, CASE, FILE):
         exec(block, names)
-    return names
+    yield names
+    forget_shape("ring")
 
 
 def gap(wall: Wall, place: list[float]) -> float:
@@ -44,7 +54,7 @@ def gap(wall: Wall, place: list[float]) -> float:
 
 def test_gaps_are_those_of_a_ring(page: dict[str, Any]) -> None:
     """Above and below the plate, and beside both rims: distance to the nearest point, less the radius."""
-    ring = page["Ring"](height=HEIGHT, inner=INNER, outer=OUTER)
+    ring = page["Ring"](point=(0.0, 0.0, HEIGHT), inner=INNER, outer=OUTER)
     for distance, height in ((0.004, 0.002), (0.004, -0.002), (0.0, 0.002), (0.0005, -0.001), (0.0075, 0.001)):
         aside = max(INNER - distance, distance - OUTER, 0.0)
         expected = math.hypot(aside, height) - RADIUS
@@ -59,12 +69,31 @@ def test_a_bead_rests_on_the_ring_and_another_falls_through_its_hole(page: dict[
     assert through[:2] == pytest.approx([0.0, 0.0], abs=1e-12) and through[2] < 0.0
 
 
-def test_the_same_ring_of_triangles_stands_in_a_case(page: dict[str, Any]) -> None:
-    simulation = Simulation(page["case"])
-    simulation.until(0.05)
-    on_it, through = simulation.particles.position
-    assert on_it[2] == pytest.approx(page["beads"].position[0, 2], abs=2e-6)
-    assert through[2] < 0.002, "on the floor"
+def test_the_ring_stands_in_a_case_as_a_shape_and_as_a_file(page: dict[str, Any]) -> None:
+    for case, rounding in ((page["case"], 1e-9), (page["case"].with_(wall=[page["file"]]), 2e-6)):
+        simulation = Simulation(case)
+        simulation.until(0.05)
+        on_it, through = simulation.particles.position
+        assert on_it[2] == pytest.approx(page["beads"].position[0, 2], abs=rounding)
+        assert through[2] < 0.002, "on the floor"
+
+
+def test_every_part_of_the_package_knows_the_shape(page: dict[str, Any]) -> None:
+    """Its keys are read, refused, explained and written; checks see its place, and pictures draw it."""
+    case = page["case"]
+    assert Case.from_text(case.to_toml()) == case and "inner radius of a ring" in call("explain", "wall.inner").out
+    with pytest.raises(InputError, match='inner: must be given for shape = "ring"'):
+        case.with_(wall=[{"shape": "ring", "outer": 0.006}])
+    with pytest.raises(InputError, match=r'inner = 0\.001: must be left out for shape = "plane"'):
+        case.with_(wall=[{"shape": "plane", "inner": 0.001}])
+    with pytest.raises(InputError, match="a ring has no inside"):
+        case.with_(wall=[{**case.wall[0].model_dump(), "solid": "inside"}])
+    (issue,) = preflight(case.with_(**{"wall.0.point": [0.1, 0.1, 0.01]})).issues
+    assert issue.key == "wall.0.point" and "lies outside the column" in issue.reason
+    in_fluid = case.with_(fluid={"density": 1000.0, "viscosity": 1e-3})
+    assert in_fluid.thin_walls == case.wall and grid_of(in_fluid).walls
+    drawn = len(case_drawing(case).axes[0].patches)
+    assert drawn == len(case_drawing(case.with_(wall=[])).axes[0].patches) + 96
 
 
 def test_a_surface_is_written_as_it_is_read(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.initial.packing import from_table
 from cfddem.particles.initial.pouring import AT_REST, Place, Spheres, poured_bed
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.particles.walls.shapes import Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 from cfddem.run.initial_particles import in_the_box
 from cfddem.run.runner import Run
 

@@ -11,7 +11,9 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 
 GLASS = Material(
     density=2500,

@@ -16,7 +16,9 @@ from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 from closures import bridge, capillary, lubrication
 from closures.liquid_film import film_volume
 

@@ -17,7 +17,9 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
+from cfddem.particles.walls.meshes import Mesh
+from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Plane
+from cfddem.particles.walls.wall import Wall
 from cfddem.run.wall_loads import wall_load_columns, wall_loads
 from closures import contact
 

@@ -28,8 +28,9 @@ from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import NOTHING, dot, flat, minus, of_row, plus, times
 from cfddem.particles.walls.arrays import wall_arrays
+from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.nearest_point import nearest
-from cfddem.particles.walls.shapes import Mesh, Wall
+from cfddem.particles.walls.wall import Wall
 from closures.wall_drag import along_wall, film_along_wall, towards_wall
 
 CLOSEST = 1e-4

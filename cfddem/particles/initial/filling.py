@@ -11,7 +11,7 @@ from scipy import ndimage
 from cfddem.backend.errors import InputError
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
-from cfddem.particles.walls.shapes import Wall
+from cfddem.particles.walls.wall import Wall
 
 SPACING = 1.05
 """Distance of neighbouring positions over the diameter of the largest sphere."""

@@ -15,7 +15,8 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import Solid, pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, kinetic_energy, make_particles
-from cfddem.particles.walls.shapes import Plane, Wall
+from cfddem.particles.walls.shapes import Plane
+from cfddem.particles.walls.wall import Wall
 from closures import contact
 
 AT_REST = 1e-7

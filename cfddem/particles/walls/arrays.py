@@ -16,8 +16,9 @@ from cfddem.backend.compile import inline, serial
 from cfddem.backend.errors import InputError
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at, flat
+from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.nearest_point import NUMBERS, TRIANGLE, Walls, in_frame, nearest
-from cfddem.particles.walls.shapes import Mesh, Wall
+from cfddem.particles.walls.wall import Wall
 
 
 def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:

@@ -1,4 +1,4 @@
-"""Walls: surfaces that particles touch; every wall has a material.
+"""Planes, boxes and round walls; those of triangles are in :mod:`cfddem.particles.walls.meshes`.
 
 Each shape gives the simple pieces it is made of and the largest speed at which its surface moves; loops take the arrays
 of :class:`cfddem.particles.walls.nearest_point.Walls`. Contact, friction and film treat every wall as flat (R* = R,
@@ -7,79 +7,25 @@ m* = m): the error is of the order of R over the wall's radius of curvature.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
-from cfddem.particles.vectors import Vector
-from cfddem.particles.walls.nearest_point import PLANE, REVOLVED, SOLID_CYLINDER, TRIANGLE
-from cfddem.particles.walls.stl import read_surface, write_stl
+from cfddem.model.triangles import Array, circle, corners_of
+from cfddem.particles.walls.wall import Sketch, Solid, Wall, unit
 
-ROUNDING = 1e-9
-"""Relative difference below which directions and positions are equal."""
+if TYPE_CHECKING:
+    from cfddem.particles.vectors import Vector
 
+SIDES, AROUND = 96, 72
+"""Sides of an open cylinder or cone as a thin wall of the fluid, and of a round wall in a picture."""
 
-@dataclass(frozen=True, kw_only=True)
-class Wall:
-    """Properties of all walls.
-
-    velocity  of the wall as a whole [m/s]
-    spin      of the wall about its centre [rad/s]
-    centre    of the spin, moves with the velocity; a point on the axis or in the middle if not given [m]
-    material  row of the pair table
-    """
-
-    velocity: Vector = (0.0, 0.0, 0.0)
-    spin: Vector = (0.0, 0.0, 0.0)
-    centre: Vector | None = None
-    material: int = 0
-
-    def __post_init__(self) -> None:
-        for field in ("velocity", "spin", "centre", "point", "low", "high", "axis", "normal"):
-            value = getattr(self, field, None)
-            if value is not None and (np.shape(value) != (3,) or not np.isfinite(value).all()):
-                raise InputError(field, value, "three finite numbers")
-        for field in ("axis", "normal"):
-            if not np.linalg.norm(getattr(self, field, 1.0)) > 0.0:
-                raise InputError(field, getattr(self, field), "a direction")
-        if self.material < 0:
-            raise InputError("material", self.material, "a row of the pair table, 0 or above")
-        self.sweep()
-
-    def pieces(self) -> list[tuple[int, list[float]]]:
-        """Kind and numbers of each piece, as :func:`cfddem.particles.walls.nearest_point.nearest` takes them."""
-        raise NotImplementedError
-
-    def frame(self) -> tuple[np.ndarray, float]:
-        """Points (n, 3) and a radius about them that enclose the wall [m]."""
-        raise NotImplementedError
-
-    def middle(self) -> np.ndarray:
-        """Centre of the spin [m]."""
-        return np.array(self.frame()[0].mean(axis=0) if self.centre is None else self.centre, float)
-
-    def sweep(self) -> float:
-        """Bound of the speed at which the surface leaves its present position [m/s]."""
-        points, around = self.frame()
-        turning = np.linalg.norm(np.cross(self.spin, points - self.middle()), axis=1).max()
-        return float(np.linalg.norm(self.velocity) + turning + np.linalg.norm(self.spin) * around)
-
-    def repeats(self, periodic: np.ndarray) -> bool:
-        """Whether the wall is the same in every image of a box with these periodic axes (3,) bool."""
-        return False
-
-    def _spins_along(self, axis: Sequence[float], point: Sequence[float] | None = None) -> bool:
-        """Whether the spin leaves a surface of revolution about this axis unchanged."""
-        along = _unit(axis)
-        aside = 0.0 if point is None else np.linalg.norm(np.cross(np.subtract(self.middle(), point), along))
-        across = float(np.linalg.norm(np.cross(self.spin, along)))
-        size = 0.0 if point is None else float(np.abs(point).max() + np.abs(self.middle()).max())
-        return across <= ROUNDING * float(np.linalg.norm(self.spin)) and float(aside) <= ROUNDING * size
+BEHIND = Solid("behind", ("none",), "the side without particles is solid")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +41,9 @@ class Plane(Wall):
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """One plane: its point and unit normal."""
-        return [(PLANE, [*self.point, *_unit(self.normal)])]
+        from cfddem.particles.walls.nearest_point import PLANE  # loads the compiler, which checks of a case lack
+
+        return [(PLANE, [*self.point, *unit(self.normal)])]
 
     def frame(self) -> tuple[np.ndarray, float]:
         return np.array([self.point], float), np.inf
@@ -106,8 +54,41 @@ class Plane(Wall):
     def sweep(self) -> float:
         """Speed along the normal [m/s]; the plane may spin about its normal only."""
         if not self._spins_along(self.normal):
-            raise InputError("spin", self.spin, "along the normal of a plane", "take a mesh for a plate that tilts")
-        return abs(float(np.dot(self.velocity, _unit(self.normal))))
+            raise InputError(
+                "spin",
+                self.spin,
+                "along the normal of a plane",
+                "take a mesh or a surface for a plate that tilts",
+            )
+        return abs(float(np.dot(self.velocity, unit(self.normal))))
+
+    @property
+    def side(self) -> Solid:
+        return BEHIND
+
+    def misplaced(self, column: Array) -> Iterator[tuple[Literal["warning", "error"], str, str, str]]:
+        away = self.distance(corners_of(np.zeros(3), column))
+        if away.max() <= 0.0:
+            yield "error", "normal", "the whole column lies behind the plane", "reverse the normal"
+        elif away.min() >= 0.0 and self.stays:
+            yield "warning", "point", "the plane does not cut the column", "move it into the column"
+
+    def distance(self, points: Array) -> Array:
+        return np.asarray((points - np.array(self.point)) @ unit(self.normal))
+
+    def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
+        return np.asarray(self.distance(points) < 0.0)
+
+    def speed_of_spin(self) -> float:
+        return 0.0
+
+    def polygons(self, far: float) -> list[Array]:
+        return [np.array(self.point) + math.sqrt(0.5) * far * circle(unit(self.normal), 4)[None]]
+
+    def sketch(self, far: float) -> Sketch:
+        along = np.array([-self.normal[2], self.normal[0]])
+        reach = far * along / max(math.hypot(*along), 1e-300)
+        return Sketch([np.array(self.point)[::2] + np.array([-reach, reach])] if along.any() else [], [])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,11 +111,13 @@ class Box(Wall):
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """Six planes whose normals point inwards."""
+        from cfddem.particles.walls.nearest_point import PLANE
+
         axes = np.eye(3)
         return [(PLANE, [*corner, *(sign * n)]) for corner, sign in ((self.low, 1), (self.high, -1)) for n in axes]
 
     def frame(self) -> tuple[np.ndarray, float]:
-        return np.array(list(itertools.product(*zip(self.low, self.high))), float), 0.0
+        return corners_of(np.array(self.low), np.array(self.high)), 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +137,116 @@ class Round(Wall):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cylinder(Round):
+class Tapered(Round):
+    """A round wall between two circles, each with a radius, or without end.
+
+    radius  of the lower end [m]
+    """
+
+    radius: float
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radii of the lower and upper end [m]."""
+        return self.radius, self.radius
+
+    @property
+    def height(self) -> float | None:
+        """Length along the axis; None without end [m]."""
+        raise NotImplementedError
+
+    @property
+    def has_caps(self) -> bool:
+        """Whether it has flat ends."""
+        return False
+
+    @property
+    def side(self) -> Solid:
+        return Solid(None)
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        return np.array([self.point, np.add(self.point, (self.height or 0.0) * unit(self.axis))]), max(self.radii)
+
+    def _ring(self, end: float, radius: float, count: int) -> Array:
+        """Points on a circle about the axis, at a distance from its lower end (count, 3) [m]."""
+        axis = unit(self.axis)
+        return np.asarray(np.array(self.point) + end * axis + radius * circle(axis, count))
+
+    def corners(self) -> Array:
+        low, high = self._ring(0.0, self.radii[0], SIDES), self._ring(self.height or 0.0, self.radii[1], SIDES)
+        after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
+        return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
+
+    def extent(self) -> Array | None:
+        if self.height is None:
+            return None
+        axis = unit(self.axis)
+        ends = np.array([self.point, np.array(self.point) + self.height * axis])
+        reach = np.outer(self.radii, np.sqrt(np.maximum(1.0 - axis**2, 0.0)))
+        return np.array([(ends - reach).min(axis=0), (ends + reach).max(axis=0)])
+
+    def _about_axis(self, points: Array) -> tuple[Array, Array]:
+        """Height along the axis and distance from it (N,), (N,) [m]."""
+        axis, away = unit(self.axis), points - np.array(self.point)
+        height = away @ axis
+        return height, np.linalg.norm(away - height[:, None] * axis, axis=1)
+
+    def distance(self, points: Array) -> Array:
+        """Of an open wall."""
+        (height, radius), length = self._about_axis(points), self.height or 0.0
+        own, top = self.radii
+        slope = top - own
+        along = np.clip(((radius - own) * slope + height * length) / (slope**2 + length**2), 0.0, 1.0)
+        return np.hypot(radius - own - along * slope, height - along * length)
+
+    def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
+        if not self.is_open:
+            return np.asarray(self.distance(points) < 0.0)
+        height, radius = self._about_axis(points)
+        length, (own, top) = self.height or 0.0, self.radii
+        there = own + (top - own) * height / length
+        beside = (height >= 0.0) & (height <= length)
+        return np.asarray(beside & ((radius > there) if side == "outside" else (radius < there)))
+
+    def speed_of_spin(self) -> float:
+        reach, arm = max(self.radii), 0.0
+        if not self._spins_along(self.axis, self.point):
+            reach += self.height or 0.0
+            arm = math.hypot(*np.subtract(self.point if self.centre is None else self.centre, self.point))
+        return math.hypot(*self.spin) * (reach + arm)
+
+    @property
+    def opening(self) -> tuple[str, float] | None:
+        own, top = self.radii
+        return ("radius" if own <= top else "top_radius", 2.0 * min(own, top)) if self.is_open else None
+
+    def circle_half_way_up(self) -> tuple[float, float, float] | None:
+        upright = self.is_open and self.axis[:2] == (0.0, 0.0)
+        return (*self.point[:2], 0.5 * sum(self.radii)) if upright else None
+
+    def _ends(self, far: float) -> tuple[float, float]:
+        return (-far, far) if self.height is None else (0.0, self.height)
+
+    def polygons(self, far: float) -> list[Array]:
+        low, high = (self._ring(end, radius, AROUND) for end, radius in zip(self._ends(far), self.radii))
+        side = np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1)
+        return [side, np.stack([low, high])] if self.has_caps else [side]
+
+    def sketch(self, far: float) -> Sketch:
+        axis, point = unit(self.axis)[::2], np.array(self.point)[::2]
+        if math.hypot(*axis) < 0.5 and self.height is not None:
+            angle = np.linspace(0.0, 2.0 * math.pi, 100)
+            return Sketch([point + self.radii[0] * np.stack([np.cos(angle), np.sin(angle)], axis=1)], [])
+        normal = np.array([-axis[1], axis[0]])
+        left, right = (
+            np.array([point + end * axis + side * radius * normal for end, radius in zip(self._ends(far), self.radii)])
+            for side in (-1.0, 1.0)
+        )
+        return Sketch([left, right, *(np.array(ends) for ends in zip(left, right) if self.has_caps)], [])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Tapered):
     """A round wall of one radius.
 
     An infinite cylinder, or one with caps, keeps particles on one side. A finite open one is a tube that particles
@@ -167,7 +259,6 @@ class Cylinder(Round):
     outside  particles are outside
     """
 
-    radius: float
     length: float | None = None
     caps: bool = False
     outside: bool = False
@@ -175,12 +266,39 @@ class Cylinder(Round):
     def __post_init__(self) -> None:
         _check_positive(self, "radius", "length")
         if self.caps and self.length is None:
-            raise InputError("caps", True, "False where no length is given")
+            raise InputError("caps", True, "false where no length is given")
+        if self.outside and self.is_open:
+            raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
         super().__post_init__()
+
+    @property
+    def height(self) -> float | None:
+        return self.length
+
+    @property
+    def has_caps(self) -> bool:
+        return self.caps
+
+    @property
+    def side(self) -> Solid:
+        return BEHIND if self.length is None or self.caps else Solid(None)
+
+    def distance(self, points: Array) -> Array:
+        if self.is_open:
+            return super().distance(points)
+        height, radius = self._about_axis(points)
+        side = radius - self.radius
+        if self.length is None:
+            return side if self.outside else -side
+        ends = np.maximum(-height, height - self.length)
+        beyond = np.hypot(np.maximum(side, 0.0), np.maximum(ends, 0.0)) + np.minimum(np.maximum(side, ends), 0.0)
+        return np.asarray(beyond if self.outside else -np.maximum(side, ends))
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """A surface of revolution, with caps two planes as well, or one solid cylinder."""
-        axis = _unit(self.axis)
+        from cfddem.particles.walls.nearest_point import PLANE, REVOLVED, SOLID_CYLINDER
+
+        axis = unit(self.axis)
         head = [*self.point, *axis, self.radius]
         if self.length is None:
             return [(REVOLVED, [*head, 0.0, -1.0 if self.outside else 1.0, -np.inf, np.inf, 0.0])]
@@ -192,9 +310,6 @@ class Cylinder(Round):
         side = (REVOLVED, [*head, 0.0, 1.0, -np.inf, np.inf, 0.0])
         return [side, (PLANE, [*self.point, *axis]), (PLANE, [*top, *-axis])]
 
-    def frame(self) -> tuple[np.ndarray, float]:
-        return np.array([self.point, np.add(self.point, (self.length or 0.0) * _unit(self.axis))]), self.radius
-
     def repeats(self, periodic: np.ndarray) -> bool:
         across = np.asarray(self.axis)[~periodic].any()
         return self.length is None and not across and int(periodic.sum()) == 1
@@ -205,11 +320,11 @@ class Cylinder(Round):
             return super().sweep()
         if not self._spins_along(self.axis, self.point):
             raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
-        return float(np.linalg.norm(np.cross(self.velocity, _unit(self.axis))))
+        return float(np.linalg.norm(np.cross(self.velocity, unit(self.axis))))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cone(Round):
+class Cone(Tapered):
     """A round wall whose radius changes along its axis, open at both ends, with contacts on both sides: a hopper.
 
     radius      of the lower end, the outlet; may be 0 [m]
@@ -232,13 +347,19 @@ class Cone(Round):
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """A surface of revolution whose line runs from the lower to the upper end."""
+        from cfddem.particles.walls.nearest_point import REVOLVED
+
         line = np.array([self.top_radius - self.radius, self.length])
         reach = float(np.linalg.norm(line))
-        return [(REVOLVED, [*self.point, *_unit(self.axis), self.radius, *(line / reach), 0.0, reach, 1.0])]
+        return [(REVOLVED, [*self.point, *unit(self.axis), self.radius, *(line / reach), 0.0, reach, 1.0])]
 
-    def frame(self) -> tuple[np.ndarray, float]:
-        top = np.add(self.point, self.length * _unit(self.axis))
-        return np.array([self.point, top]), max(self.radius, self.top_radius)
+    @property
+    def radii(self) -> tuple[float, float]:
+        return self.radius, self.top_radius
+
+    @property
+    def height(self) -> float:
+        return self.length
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,7 +385,9 @@ class Turned(Round):
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """One surface of revolution for each piece of the line."""
-        points, axis = np.asarray(self.line, float), _unit(self.axis)
+        from cfddem.particles.walls.nearest_point import REVOLVED
+
+        points, axis = np.asarray(self.line, float), unit(self.axis)
         steps = np.diff(points, axis=0)
         slopes = steps[:, 1] / steps[:, 0]
         stands_out = np.concatenate([[False], np.diff(slopes) > 0.0, [False]])  # an edge of the wall, not a corner
@@ -280,81 +403,8 @@ class Turned(Round):
         return pieces
 
     def frame(self) -> tuple[np.ndarray, float]:
-        points, axis = np.asarray(self.line, float), _unit(self.axis)
+        points, axis = np.asarray(self.line, float), unit(self.axis)
         return np.array([np.add(self.point, z * axis) for z in points[:, 0]]), float(points[:, 1].max())
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Mesh(Wall):
-    """A surface of triangles, with contacts on both sides.
-
-    Triangles are neighbours if they have corners in common, bit by bit. Surfaces that join smoothly must be in one
-    mesh. A plate that is thinner than the reach of a film gives the films of both its faces.
-
-    vertices   (V, 3) [m]
-    triangles  (T, 3) int, rows of `vertices`
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-
-    def __post_init__(self) -> None:
-        vertices, triangles = np.asarray(self.vertices, float), np.asarray(self.triangles, np.int64)
-        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
-            raise InputError("vertices", vertices.shape, "a table (V, 3) of finite numbers")
-        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.min(initial=0) < 0:
-            raise InputError("triangles", triangles.shape, "a table (T, 3) of rows of `vertices`")
-        if triangles.max(initial=0) >= len(vertices):
-            raise InputError("triangles", int(triangles.max()), f"below the number of vertices, {len(vertices)}")
-        vertices, names = np.unique(vertices, axis=0, return_inverse=True)
-        triangles = names.reshape(-1)[triangles]
-        a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
-        longest = np.maximum(np.linalg.norm(b - a, axis=1), np.linalg.norm(c - a, axis=1))
-        triangles = triangles[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * longest**2]
-        if len(triangles) == 0:
-            raise InputError("triangles", 0, "at least one with an area")
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "triangles", triangles)
-        super().__post_init__()
-
-    @classmethod
-    def from_stl(cls, path: str | Path, *, scale: float = 1.0, place: Vector = (0.0, 0.0, 0.0), **options: Any) -> Mesh:
-        """Read a surface from a file.
-
-        path     STL, or another surface format that pyvista reads
-        scale    length of the file's unit [m]
-        place    of the file's origin [m]
-        options  as of :class:`Wall`
-        """
-        return cls.of_corners(np.array(place) + scale * read_surface(path), **options)
-
-    @classmethod
-    def of_corners(cls, corners: np.ndarray, **options: Any) -> Mesh:
-        """A surface from the corners of its triangles (T, 3, 3) [m]; options as of :class:`Wall`."""
-        return cls(vertices=corners.reshape(-1, 3), triangles=np.arange(3 * len(corners)).reshape(-1, 3), **options)
-
-    def to_stl(self, path: str | Path) -> None:
-        """Write the surface as an STL file in metres, for a wall of a case."""
-        write_stl(path, self.vertices[self.triangles])
-
-    def pieces(self) -> list[tuple[int, list[float]]]:
-        """Corners and unit normal of every triangle."""
-        corners = self.vertices[self.triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return [(TRIANGLE, [*abc, *n]) for abc, n in zip(corners.reshape(-1, 9), normal)]
-
-    def frame(self) -> tuple[np.ndarray, float]:
-        return self.vertices, 0.0
-
-    def middle(self) -> np.ndarray:
-        if self.centre is not None:
-            return np.array(self.centre, float)
-        return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
-
-
-def _unit(direction: Sequence[float]) -> np.ndarray:
-    return np.asarray(direction, float) / np.linalg.norm(direction)
 
 
 def _check_positive(wall: Wall, *fields: str) -> None:

@@ -4,16 +4,40 @@ from __future__ import annotations
 
 import os
 import re
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.model.triangles import is_closed
 
 HEADER, RECORD = 80, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """Bytes before the number of triangles of a binary file, and one triangle after it."""
 
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+
+
+def stamp(owner: Any) -> tuple[int, int]:
+    """Time and size of the file of a wall or vessel, which tell whether it has changed; 0 without a file."""
+    try:
+        status = os.stat(getattr(owner, "file", None) or "")
+    except (OSError, ValueError):
+        return 0, 0
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=8)
+def kept_surface(path: str, _: tuple[int, int]) -> np.ndarray:
+    """See `read_surface`; a file with the same `stamp` is read once."""
+    return read_surface(path)
+
+
+@lru_cache(maxsize=8)
+def is_closed_surface(path: str, written: tuple[int, int]) -> bool:
+    """Whether the surface of a file is closed; as `kept_surface`."""
+    return is_closed(kept_surface(path, written))
 
 
 def read_surface(path: str | Path) -> np.ndarray:
