@@ -62,6 +62,30 @@ class StepReport:
     passes: int
 
 
+@dataclass(frozen=True)
+class Scheme:
+    """How the equations of the fluid are written and solved.
+
+    model        "A" or "B"
+    convection   "limited" (upwind with the MC limiter, bounded) or "central" (unlimited, for smooth fields)
+    smagorinsky  constant C of the sub-grid viscosity rho (C Delta)^2 |S|, about 0.1; 0 for none
+    tolerance    largest continuity residual of a cell over the largest flux through a face
+    """
+
+    model: str = "A"
+    convection: str = "limited"
+    smagorinsky: float = 0.0
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        if self.model not in ("A", "B"):
+            raise InputError("fluid.model", self.model, '"A" or "B"')
+        if self.convection not in ("limited", "central"):
+            raise InputError("fluid.convection", self.convection, '"limited" or "central"')
+        if not 1e-13 <= self.tolerance <= 1e-3:
+            raise InputError("fluid.tolerance", self.tolerance, "between 1e-13 and 1e-3")
+
+
 class FluidSolver:
     """Volume-averaged incompressible flow on a grid.
 
@@ -70,11 +94,8 @@ class FluidSolver:
     density       rho [kg/m3]
     viscosity     mu, dynamic: a number, or of every cell (nz, ny, nx) [Pa s]
     gravity       g (x, y, z) [m/s2]; enters only the static pressure, see `cfddem.fluid.momentum`
-    model         "A" or "B"
-    convection    "limited" (upwind with the MC limiter, bounded) or "central" (unlimited, for smooth fields)
-    smagorinsky   constant C of the sub-grid viscosity rho (C Delta)^2 |S|, about 0.1; 0 for none
     voidage       (nz, ny, nx) at the start, or a number
-    tolerance     largest continuity residual of a cell over the largest flux through a face
+    scheme        model A or B, convection, sub-grid viscosity and tolerance
     communicator  path to sums, extremes and decisions over all ranks
 
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
@@ -91,36 +112,28 @@ class FluidSolver:
         density: float,
         viscosity: Array | float,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
-        model: str = "A",
-        convection: str = "limited",
-        smagorinsky: float = 0.0,
         voidage: Array | float = 1.0,
-        tolerance: float = 1e-9,
+        scheme: Scheme = Scheme(),
         communicator: Communicator = SERIAL,
     ) -> None:
         if not (np.isfinite(density) and density > 0.0):
             raise InputError("fluid.density", density, "a positive number, in kg/m3")
-        if model not in ("A", "B"):
-            raise InputError("fluid.model", model, '"A" or "B"')
-        if convection not in ("limited", "central"):
-            raise InputError("fluid.convection", convection, '"limited" or "central"')
-        if not 1e-13 <= tolerance <= 1e-3:
-            raise InputError("fluid.tolerance", tolerance, "between 1e-13 and 1e-3")
         sides = boundaries if isinstance(boundaries, Boundaries) else Boundaries(grid, boundaries)
         refuse_trapped_inflow(grid, sides)
         self.grid, self.boundaries, self.communicator = grid, sides, communicator
-        self.density, self.model, self.gravity = float(density), model, np.asarray(gravity, dtype=float)
-        self.tolerance = float(tolerance)
+        self.density, self.model, self.gravity = float(density), scheme.model, np.asarray(gravity, dtype=float)
+        self.tolerance = float(scheme.tolerance)
         self.time, self.last_step = 0.0, 0.0
         self.followers: list[Any] = []
         self.body_forces: list[Callable[[], Array]] = []
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
-        self.model_b, self.inverse_spacing = float(model == "B"), 1.0 / np.array(grid.spacing)
-        self._medium = Medium(self.density, self.inverse_spacing, float(convection == "central"), self.model_b)
+        self.model_b, self.inverse_spacing = float(self.model == "B"), 1.0 / np.array(grid.spacing)
+        central = float(scheme.convection == "central")
+        self._medium = Medium(self.density, self.inverse_spacing, central, self.model_b)
         self.face_areas = np.array([grid.face_area(d) for d in range(3)])
         self.open_cells = grid.open.astype(float)
         self._every_face = np.ones_like(self.faces.solved)
-        self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(smagorinsky))
+        self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(scheme.smagorinsky))
         self._projection = Projection(sides, self.fields, communicator)
         self.walls = near_walls(sides, self.fields, self.faces.solved)
         self._rates = FlowRates(sides, self.density, communicator)

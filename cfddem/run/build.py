@@ -35,7 +35,7 @@ from cfddem.features.moving_walls import case_walls
 from cfddem.fluid.block import Block, Division
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.model.feature import FluidForce
 from cfddem.particles.ghosts import SingleDomain, handed_out
 from cfddem.particles.interactions.bond import BondLaw
@@ -143,8 +143,7 @@ def flow_of(
         density=case.required_fluid.density,
         viscosity=case.required_fluid.viscosity_at(grid.centres()[2]),
         gravity=case.laws.gravity,
-        model=case.laws.model,
-        convection=case.laws.convection,
+        scheme=Scheme(model=case.laws.model, convection=case.laws.convection),
         communicator=communicator,
     )
     kernel = FilterKernel(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from scenarios.validation.table import reference
 
 ALL_PERIODIC = dict.fromkeys(SIDES, Periodic())
@@ -35,7 +35,11 @@ def taylor_green(
     """Errors in L2 of velocity and pressure of vortices that decay as exp(-2 nu t) and drift along x (exact)."""
     width = 2 * np.pi / n
     fluid = FluidSolver(
-        Grid((n, 1, n), (width, width, width)), ALL_PERIODIC, density=1.0, viscosity=viscosity, convection=convection
+        Grid((n, 1, n), (width, width, width)),
+        ALL_PERIODIC,
+        density=1.0,
+        viscosity=viscosity,
+        scheme=Scheme(convection=convection),
     )
     fluid.set_velocity(
         (lambda x, y, z: np.sin(x) * np.cos(z) + drift + 0 * y, 0.0, lambda x, y, z: -np.cos(x) * np.sin(z) + 0 * y)
@@ -98,7 +102,7 @@ def cavity(reynolds: int, n: int, until: float) -> dict[str, Array]:
     h = 1.0 / n
     fluid = FluidSolver(
         Grid((n, 1, n), (h, h, h)), {"z_high": NoSlip((1.0, 0.0, 0.0))},
-        density=1.0, viscosity=1.0 / reynolds, convection="central",
+        density=1.0, viscosity=1.0 / reynolds, scheme=Scheme(convection="central"),
     )  # fmt: skip
     fluid.run_until(until, courant=0.8, largest=0.8 * h)
     profiles = {}
@@ -147,7 +151,7 @@ def fixed_bed(model: str, speed: float, cells: tuple[int, ...]) -> float:
     # eps dp/dz = beta_A U/eps in model A, dp/dz = beta_B U/eps in model B
     beta = gradient * voidage**2 / speed if model == "A" else gradient * voidage / speed
     sides = {**dict.fromkeys(SIDES[:4], Periodic()), "z_low": Inlet(speed), "z_high": Outlet()}
-    fluid = FluidSolver(grid, sides, density=density, viscosity=viscosity, voidage=voidage, model=model)
+    fluid = FluidSolver(grid, sides, density=density, viscosity=viscosity, voidage=voidage, scheme=Scheme(model=model))
     for _ in range(200):
         fluid.step(fluid.largest_step().step, None, beta)
     return float(fluid.pressure[0].mean()) / float(gradient[:, 0, 0].sum() * h)
@@ -158,7 +162,13 @@ def water_at_rest(model: str) -> float:
     grid = Grid((4, 4, 32), (0.01, 0.01, 0.01))
     voidage = np.where(np.random.default_rng(0).random(grid.shape) < 0.5, 0.4, 1.0)
     fluid = FluidSolver(
-        grid, {"z_high": Outlet()}, density=1000.0, viscosity=1e-3, gravity=(0, 0, -9.81), voidage=voidage, model=model
+        grid,
+        {"z_high": Outlet()},
+        density=1000.0,
+        viscosity=1e-3,
+        gravity=(0, 0, -9.81),
+        voidage=voidage,
+        scheme=Scheme(model=model),
     )
     for _ in range(5):
         fluid.step(1e-3, None, np.where(voidage < 1, 1e5, 0.0))
@@ -248,7 +258,7 @@ def error(n: int, steps: int, until: float = 0.4, model: str = "A") -> tuple[flo
     h, step = 2 * np.pi / n, until / steps
     fluid = FluidSolver(
         Grid((n, 1, n), (h, h, h)), ALL_PERIODIC, density=case.density, viscosity=case.viscosity,
-        model=model, convection="central", voidage=0.5, tolerance=1e-10,
+        scheme=Scheme(model=model, convection="central", tolerance=1e-10), voidage=0.5,
     )  # fmt: skip
     x, _, z = fluid.grid.centres()
 

@@ -17,7 +17,7 @@ from cfddem.case.patch_faces import patch_faces
 from cfddem.case.patches import CasePatch
 from cfddem.case.schema import Case
 from cfddem.features.feeds import Opening
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.particles.state import make_particles
 from cfddem.plotting.case_drawing import case_drawing
 from cfddem.plotting.curves import save
@@ -90,7 +90,7 @@ def flow_in(case: Case, steps: int = 30, tolerance: float = 1e-13) -> tuple[Flui
     """A fluid after some steps, and its flow through all faces normal to x, y, z [m3/s]."""
     grid, fluid = grid_of(case), case.required_fluid
     flow = FluidSolver(
-        grid, boundaries_of(case), density=fluid.density, viscosity=fluid.viscosity, tolerance=tolerance
+        grid, boundaries_of(case), density=fluid.density, viscosity=fluid.viscosity, scheme=Scheme(tolerance=tolerance)
     )  # fmt: skip
     for _ in range(steps):
         flow.step(min(2e-3, 0.5 * flow.largest_step().step))

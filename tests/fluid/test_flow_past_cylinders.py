@@ -17,7 +17,7 @@ import pytest
 from cfddem.fluid.conditions import FreeSlip, Inlet, Outlet
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import cylinder
 from cfddem.fluid.wall_force import force_on_walls, pressure_on_walls
 
@@ -44,7 +44,7 @@ def channel(cells: int, until: float = 8.0) -> tuple[float, float, float]:
 
     grid = within(Grid((round(length / h), cells, 1), (h, h, h)), cylinder((0.2, 0.2, 0.0), 0.05, inside=False))
     sides = {"x_low": Inlet(lambda x, y, z, t: profile(y)), "x_high": Outlet()}
-    fluid = FluidSolver(grid, sides, density=1.0, viscosity=1e-3, convection="central")
+    fluid = FluidSolver(grid, sides, density=1.0, viscosity=1e-3, scheme=Scheme(convection="central"))
     fluid.set_velocity((lambda x, y, z: profile(y) + 0.0 * x, 0.0, 0.0))
     fluid.run_until(until, courant=0.8)
     drag, lift, _ = force(fluid) / (0.5 * mean**2 * diameter)
@@ -76,7 +76,7 @@ def in_stream(reynolds: float, stages: tuple[tuple[int, float], ...]) -> tuple[f
         half = Grid(((BEFORE + BEHIND) * cells, BESIDE * cells, 1), (h, h, h))
         grid = within(half, cylinder((BEFORE, 0.0, 0.0), 0.5, inside=False))
         sides = {"x_low": Inlet(1.0), "x_high": Outlet(), "y_low": FreeSlip(), "y_high": FreeSlip()}
-        fluid = FluidSolver(grid, sides, density=1.0, viscosity=1.0 / reynolds, convection="central")
+        fluid = FluidSolver(grid, sides, density=1.0, viscosity=1.0 / reynolds, scheme=Scheme(convection="central"))
         fluid.set_velocity(start)
         fluid.run_until(until, courant=0.8, largest=0.8 * h)
         start = tuple(finer(fluid, axis) for axis in range(3))

@@ -8,7 +8,7 @@ import pytest
 from cfddem.fluid import budgets
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from scenarios.references.flows import ALL_PERIODIC, fixed_bed
 
 ALL_WALLS = dict.fromkeys(SIDES, NoSlip())
@@ -73,7 +73,12 @@ def test_ledgers_of_volume_and_momentum_close_in_a_periodic_box(convection):
     rng = np.random.default_rng(2)
     grid = Grid((10, 7, 12), (0.01, 0.02, 0.015))
     fluid = FluidSolver(
-        grid, ALL_PERIODIC, density=2.0, viscosity=1e-3, convection=convection, voidage=moving_voidage(grid, 0.0)
+        grid,
+        ALL_PERIODIC,
+        density=2.0,
+        viscosity=1e-3,
+        scheme=Scheme(convection=convection),
+        voidage=moving_voidage(grid, 0.0),
     )
     fluid.set_velocity([rng.standard_normal(fluid.face_velocity(d).shape) for d in range(3)])
     step = 5e-4
@@ -116,7 +121,7 @@ def test_momentum_ledger_closes_in_a_closed_box():
         {**ALL_WALLS, "z_high": NoSlip((1.0, 0.5, 0.0))},
         density=rho,
         viscosity=mu,
-        convection="central",
+        scheme=Scheme(convection="central"),
         voidage=eps,
     )
     fluid.set_velocity([rng.standard_normal(fluid.face_velocity(d).shape) for d in range(3)])
@@ -175,7 +180,7 @@ def test_a_uniform_velocity_stays_uniform_in_a_moving_voidage(convection):
         x, _, z = grid.centres()
         return 0.65 + 0.3 * np.tanh(3 * np.sin(2 * np.pi * (x - speed * t))) * np.cos(2 * np.pi * z)
 
-    fluid = FluidSolver(grid, ALL_PERIODIC, density=1.0, viscosity=0.0, convection=convection)
+    fluid = FluidSolver(grid, ALL_PERIODIC, density=1.0, viscosity=0.0, scheme=Scheme(convection=convection))
     fluid.set_voidage(voidage(step / 2), voidage(-step / 2), step)
     fluid.set_velocity((0.0, 0.5, 0.0))
     for k in range(1, 4 * n + 1):
@@ -192,7 +197,7 @@ def test_models_a_and_b_give_the_single_phase_flow_in_a_uniform_voidage(voidage)
         h = 1 / 16
         fluid = FluidSolver(
             Grid((16, 1, 16), (h, h, h)), {"z_high": NoSlip((1.0, 0.0, 0.0))},
-            density=1.0, viscosity=0.01, voidage=eps, model=model, tolerance=1e-12,
+            density=1.0, viscosity=0.01, voidage=eps, scheme=Scheme(model=model, tolerance=1e-12),
         )  # fmt: skip
         for _ in range(60):
             fluid.step(0.02)
@@ -211,7 +216,13 @@ def test_a_fluid_at_rest_stays_at_rest_at_a_voidage_jump(model):
     rng = np.random.default_rng(0)
     voidage = np.where(rng.random(grid.shape) < 0.5, 0.4, 1.0)
     fluid = FluidSolver(
-        grid, {"z_high": Outlet()}, density=1000.0, viscosity=1e-3, gravity=(0, 0, -9.81), voidage=voidage, model=model
+        grid,
+        {"z_high": Outlet()},
+        density=1000.0,
+        viscosity=1e-3,
+        gravity=(0, 0, -9.81),
+        voidage=voidage,
+        scheme=Scheme(model=model),
     )
     beta = np.where(voidage < 1, 1e5, 0.0)
     limit = 1e-10 * np.sqrt(9.81 * 0.32)
@@ -242,7 +253,7 @@ def test_stiff_drag_relaxes_the_fluid_to_the_particle_velocity(stiffness, model)
     """beta h/(eps rho) up to 1e6: the velocity relaxes by 1/(1 + z + z^2/2) a step and never overshoots."""
     grid = Grid((8, 8, 8), (0.01,) * 3)
     eps, rho, step = 0.5, 1.2, 1e-3
-    fluid = FluidSolver(grid, ALL_PERIODIC, density=rho, viscosity=1.8e-5, voidage=eps, model=model)
+    fluid = FluidSolver(grid, ALL_PERIODIC, density=rho, viscosity=1.8e-5, voidage=eps, scheme=Scheme(model=model))
     beta = np.full(grid.shape, stiffness * eps * rho / step)
     target = np.array([0.3, -0.2, 0.1])
     left = 1.0
@@ -277,7 +288,7 @@ def test_drag_impulses_of_cells_add_up_to_the_change_of_momentum(model):
     rng = np.random.default_rng(7)
     grid = Grid((8, 6, 10), (0.01, 0.02, 0.01))
     voidage = rng.uniform(0.4, 1.0, grid.shape)
-    fluid = FluidSolver(grid, ALL_PERIODIC, density=1000.0, viscosity=0.0, voidage=voidage, model=model)
+    fluid = FluidSolver(grid, ALL_PERIODIC, density=1000.0, viscosity=0.0, voidage=voidage, scheme=Scheme(model=model))
     beta = rng.uniform(0, 1e5, grid.shape)
     before = momentum(fluid)
     fluid.step(1e-3, None, beta, beta[..., None] * np.array([0.1, 0.0, -0.2]))
@@ -289,7 +300,7 @@ def test_drag_impulses_of_cells_add_up_to_the_change_of_momentum(model):
     direct = 1e-3 * grid.cell_volume * weight * beta[..., None] * (np.array([0.1, 0.0, -0.2]) - seen)
     assert np.abs(direct - impulse).max() < 1e-12 * np.abs(impulse).max()
 
-    together = FluidSolver(grid, ALL_PERIODIC, density=1000.0, viscosity=0.0, voidage=0.7, model=model)
+    together = FluidSolver(grid, ALL_PERIODIC, density=1000.0, viscosity=0.0, voidage=0.7, scheme=Scheme(model=model))
     together.set_velocity((0.1, 0.0, -0.2))
     together.step(1e-3, None, beta, beta[..., None] * np.array([0.1, 0.0, -0.2]))
     assert np.abs(budgets.drag_exchange(together)).max() < 1e-12 * beta.max() * 1e-3 * grid.cell_volume
@@ -307,7 +318,12 @@ def test_a_restored_fluid_goes_on_to_the_same_bits():
 
     def fresh():
         return FluidSolver(
-            grid, sides, density=1.2, viscosity=1.8e-5, smagorinsky=0.1, voidage=moving_voidage(grid, 0.0)
+            grid,
+            sides,
+            density=1.2,
+            viscosity=1.8e-5,
+            scheme=Scheme(smagorinsky=0.1),
+            voidage=moving_voidage(grid, 0.0),
         )
 
     def advance(fluid, steps):

@@ -9,7 +9,7 @@ import pytest
 
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, ramp
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from scenarios.references.flows import ALL_PERIODIC, cavity, duct, ghia, order, pipe, rms, sound, taylor_green
 
 
@@ -33,7 +33,11 @@ def test_order_in_time_is_two_for_velocity_and_pressure():
         n = 24
         width = 2 * np.pi / n
         fluid = FluidSolver(
-            Grid((n, 1, n), (width, width, width)), ALL_PERIODIC, density=1.0, viscosity=0.05, convection="central"
+            Grid((n, 1, n), (width, width, width)),
+            ALL_PERIODIC,
+            density=1.0,
+            viscosity=0.05,
+            scheme=Scheme(convection="central"),
         )
         fluid.set_velocity((lambda x, y, z: np.sin(x) * np.cos(z) + 1, 0.0, lambda x, y, z: -np.cos(x) * np.sin(z)))
         for _ in range(steps):
@@ -50,7 +54,12 @@ def test_poiseuille_flow_between_plates(voidage, model):
         height, mu, fall = 1.0, 0.5, 2.0
         sides = {"x_low": Periodic(fall), "x_high": Periodic(fall), "y_low": Periodic(), "y_high": Periodic()}
         fluid = FluidSolver(
-            Grid((1, 1, n), (height / n,) * 3), sides, density=1.0, viscosity=mu, voidage=voidage, model=model
+            Grid((1, 1, n), (height / n,) * 3),
+            sides,
+            density=1.0,
+            viscosity=mu,
+            voidage=voidage,
+            scheme=Scheme(model=model),
         )
         fluid.run_until(2.5)
         _, _, z = fluid.grid.faces(0)
@@ -153,7 +162,9 @@ def test_flow_above_a_varying_inlet_is_translation_invariant_along_a_periodic_di
             return 0.1 + 0.2 * (place == 4) + 0.1 * (place == 5)
 
         sides = {**dict.fromkeys(across, Periodic()), "z_low": Inlet(jet), "z_high": Outlet()}
-        fluid = FluidSolver(Grid(tuple(cells), (0.1,) * 3), sides, density=1.0, viscosity=0.01, tolerance=1e-12)
+        fluid = FluidSolver(
+            Grid(tuple(cells), (0.1,) * 3), sides, density=1.0, viscosity=0.01, scheme=Scheme(tolerance=1e-12)
+        )
         for _ in range(5):
             fluid.step(0.05)
         return fluid
@@ -191,7 +202,11 @@ def test_a_shear_layer_is_convected_without_overshoot():
     for convection in ("limited", "central"):
         n = 32
         fluid = FluidSolver(
-            Grid((n, n, 1), (1.0 / n,) * 3), {**ALL_PERIODIC}, density=1.0, viscosity=0.0, convection=convection
+            Grid((n, n, 1), (1.0 / n,) * 3),
+            {**ALL_PERIODIC},
+            density=1.0,
+            viscosity=0.0,
+            scheme=Scheme(convection=convection),
         )
         fluid.set_velocity((1.0, 0.0, lambda x, y, z: np.where((x > 0.25) & (x < 0.75), 1.0, 0.0) + 0 * y))
         for _ in range(40):
@@ -209,7 +224,7 @@ def test_smagorinsky_viscosity_of_a_uniform_shear():
     sides = {"z_low": NoSlip(), "z_high": NoSlip((shear, 0.0, 0.0))}
     for side in ("x_low", "x_high", "y_low", "y_high"):
         sides[side] = Periodic()
-    fluid = FluidSolver(Grid((4, 4, n), (h, h, h)), sides, density=2.0, viscosity=0.01, smagorinsky=c)
+    fluid = FluidSolver(Grid((4, 4, n), (h, h, h)), sides, density=2.0, viscosity=0.01, scheme=Scheme(smagorinsky=c))
     fluid.set_velocity((lambda x, y, z: shear * z + 0 * x + 0 * y, 0.0, 0.0))
     limit = fluid.largest_step()
     expected = 0.01 + 2.0 * (c * h) ** 2 * shear

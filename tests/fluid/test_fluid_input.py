@@ -9,7 +9,7 @@ from cfddem.backend.errors import InputError, RunFailed
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, ramp, rectangle
 from cfddem.fluid.grid import Grid, outside_cylinder
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 
 BOX = Grid((6, 6, 8), (0.01,) * 3)
 AIR = {"density": 1.2, "viscosity": 1.8e-5}
@@ -70,9 +70,9 @@ REFUSED = {
         lambda: started({"z_low": Inlet(lambda x, y, z, t: np.ones(5)), "z_high": Outlet()}), "for 36 faces"),
     "density": (lambda: started(density=0.0), "fluid.density"),
     "viscosity": (lambda: started(viscosity=-1.0), "fluid.viscosity"),
-    "model": (lambda: started(model="C"), '"A" or "B"'),
-    "convection": (lambda: started(convection="upwind"), '"limited" or "central"'),
-    "tolerance": (lambda: started(tolerance=1.0), "fluid.tolerance"),
+    "model": (lambda: Scheme(model="C"), '"A" or "B"'),
+    "convection": (lambda: Scheme(convection="upwind"), '"limited" or "central"'),
+    "tolerance": (lambda: Scheme(tolerance=1.0), "fluid.tolerance"),
     "voidage above one": (lambda: stepped(np.full(BOX.shape, 1.1)), "voidage = 1.1: must be above 0 and at most 1"),
     "voidage NaN": (lambda: stepped(np.full(BOX.shape, np.nan)), "voidage"),
     "voidage of another shape": (lambda: stepped(np.ones((6, 6, 6))), r"of shape \(nz, ny, nx\)"),

@@ -136,11 +136,11 @@ import numpy as np
 from cfddem.fluid import budgets
 from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 rng = np.random.default_rng(0)
 grid = Grid((15, 9, 33), (0.01, 0.01, 0.012))
 sides = {"z_low": Inlet(0.4), "z_high": Outlet(), "x_low": Periodic(), "x_high": Periodic()}
-fluid = FluidSolver(grid, sides, density=1.2, viscosity=1.8e-5, smagorinsky=0.1)
+fluid = FluidSolver(grid, sides, density=1.2, viscosity=1.8e-5, scheme=Scheme(smagorinsky=0.1))
 voidage = rng.uniform(0.4, 0.9, grid.shape)
 fluid.set_voidage(voidage)
 for _ in range(4):

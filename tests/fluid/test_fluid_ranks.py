@@ -21,7 +21,7 @@ from cfddem.fluid.grid import Array, Grid, outside_cylinder
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.regions import ClosedRegions
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import turned
 from cfddem.fluid.wall_force import loads_on_walls
 
@@ -155,7 +155,7 @@ def fluid_of(name: str, communicator: Communicator = SERIAL, division: Division 
     whole, sides, others = FLOWS[name]
     grid = whole if division is None else Block(whole, division, communicator)
     fluid = FluidSolver(
-        grid, sides, density=1.2, viscosity=1.8e-3, tolerance=1e-11, communicator=communicator, **others
+        grid, sides, density=1.2, viscosity=1.8e-3, scheme=Scheme(tolerance=1e-11, **others), communicator=communicator
     )
     fluid.set_voidage(grid.part(np.random.default_rng(0).uniform(0.4, 0.9, whole.shape)))
     return fluid

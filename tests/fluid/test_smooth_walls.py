@@ -15,7 +15,7 @@ from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.near_walls import NoWalls
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import Plane, Surface, cylinder, together, turned
 from cfddem.fluid.wall_force import force_on_walls
 
@@ -120,7 +120,9 @@ def assert_mass_is_kept(drawn: list[Surface]) -> None:
         grid = within(Grid((7, 8, 9), (1.0 / 7, 1.0 / 8, 1.0 / 9)), together(*drawn))
     except InputError:
         reject()  # no fluid is left, or a wall hides within a cell
-    fluid = FluidSolver(grid, {"z_high": Outlet(), "x_low": Outlet()}, density=1.0, viscosity=0.01, tolerance=1e-13)
+    fluid = FluidSolver(
+        grid, {"z_high": Outlet(), "x_low": Outlet()}, density=1.0, viscosity=0.01, scheme=Scheme(tolerance=1e-13)
+    )
     before, after = (0.6 + 0.1 * np.sin(np.arange(grid.open.size) + step).reshape(grid.shape) for step in (0.0, 0.3))
     fluid.set_voidage(before)
     fluid.set_velocity((0.3, 0.2, 1.0))

@@ -18,7 +18,7 @@ from cfddem.fluid.cell_groups import large_cells
 from cfddem.fluid.conditions import Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.cut_cells import open_share, within
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import cylinder
 from cfddem.fluid.thin_walls import ASIDE, ThinWall, divided, thin_wall
 from cfddem.fluid.wall_force import force_on_walls
@@ -46,7 +46,7 @@ def test_nothing_leaves_a_tube_from_the_floor_to_the_lid():
     grid = within(Grid((n, n, n), (1.0 / n,) * 3), divided(thin_wall(tube(0.27, -1.0, 2.0)), cylinder(MIDDLE, 0.47)))
     inside = lambda x, y, z: np.hypot(x - 0.5, y - 0.5) < 0.27  # noqa: E731
     sides = {"z_low": [NoSlip(), Inlet(0.5, where=inside)], "z_high": Outlet()}
-    fluid = FluidSolver(grid, sides, density=1.0, viscosity=1e-3, tolerance=1e-13)
+    fluid = FluidSolver(grid, sides, density=1.0, viscosity=1e-3, scheme=Scheme(tolerance=1e-13))
     for _ in range(3):
         fluid.step(0.02)
     flux = fluid.volume_flux(2) * grid.face_area(2)
@@ -66,7 +66,9 @@ def test_a_stream_does_not_enter_a_closed_box_of_thin_walls(lean, spin):
     corners = np.add(turned_by(0.23 * BOX, lean, spin), [0.48, 0.53, 0.49])
     thin = thin_wall(corners)
     grid = within(Grid((10, 10, 10), (0.1,) * 3), divided(thin))
-    fluid = FluidSolver(grid, {"z_low": Inlet(0.5), "z_high": Outlet()}, density=1.0, viscosity=1e-2, tolerance=1e-13)
+    fluid = FluidSolver(
+        grid, {"z_low": Inlet(0.5), "z_high": Outlet()}, density=1.0, viscosity=1e-2, scheme=Scheme(tolerance=1e-13)
+    )
     for _ in range(3):
         fluid.step(0.02)
     cut = fluid.boundaries.cut

@@ -8,7 +8,7 @@ from example_case import MIXTURE
 from cfddem.features.energy import EnergyLedger
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from golden.building import SCENARIOS, TIGHT, coupled, go_on, kept_and_restored
 from golden.registry import State, golden
 from golden.states import collisions, counted, different, field_state, state_of
@@ -221,7 +221,7 @@ def fluid_alone() -> State:
     fluid = FluidSolver(
         grid,
         {**sides, "z_low": [NoSlip(), inlet], "z_high": Outlet()},
-        density=1.2, viscosity=1.8e-5, smagorinsky=0.1, gravity=(0.0, 0.0, -9.81), tolerance=TIGHT,
+        density=1.2, viscosity=1.8e-5, scheme=Scheme(smagorinsky=0.1, tolerance=TIGHT), gravity=(0.0, 0.0, -9.81),
     )  # fmt: skip
     source = np.random.default_rng(6).normal(0.0, 1.0, (*grid.shape, 3)) * ~block(*grid.centres())[..., None]
     for _ in range(4):
