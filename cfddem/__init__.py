@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.fluid.conditions import Periodic as Periodic
     from cfddem.fluid.grid import Grid as Grid
     from cfddem.fluid.solver import FluidSolver as FluidSolver
+    from cfddem.fluid.solver import Scheme as Scheme
     from cfddem.io.reading import open_run as open_run
     from cfddem.model.feature import Equipment as Equipment
     from cfddem.model.feature import Feature as Feature
@@ -46,6 +47,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.particles.interactions.laws import Laws as Laws
     from cfddem.particles.material_pairs import pair_table as pair_table
     from cfddem.particles.solver import ParticleSolver as ParticleSolver
+    from cfddem.particles.solver import SolverSettings as SolverSettings
     from cfddem.particles.state import make_particles as make_particles
     from cfddem.particles.walls.meshes import Mesh as Mesh
     from cfddem.particles.walls.shapes import Box as Box
@@ -105,7 +107,9 @@ _MODULES = {
     "report": "cfddem.analysis.report",
     "Run": "cfddem.run.runner",
     "run_case": "cfddem.studies.notebook",
+    "Scheme": "cfddem.fluid.solver",
     "Simulation": "cfddem.run.simulation",
+    "SolverSettings": "cfddem.particles.solver",
     "StepSettings": "cfddem.run.time_steps",
     "Weight": "cfddem.coupling.forces.pressure",
 }

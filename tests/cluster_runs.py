@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from solver_options import grouped
 from test_ghosts import DRY, GLASS, STEEL, WET, state
 
 from cfddem.backend.communicator import Communicator
@@ -64,7 +65,7 @@ def bed(communicator: Communicator, kind: str, count: int, steps: int, without: 
     if communicator.size > 1:
         planes = [box[0] * n / communicator.size for n in range(1, communicator.size)]
         given |= {"communicator": communicator, "division": Bricks.slabs(0, planes)}
-    run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), check_steps=False, **given)
+    run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), **grouped(check_steps=False, **given))
     leave_out(run.lists.ghosts, without)
     arrived, parts = 0, 10
     for _ in range(parts):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from solver_options import grouped
 
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
@@ -108,7 +109,7 @@ class Pair:
             )
             planes = []
         chosen = {"skin": max(self.radii), "check_steps": False} | options  # an impact has a clock of its own
-        return ParticleSolver(made, self.rows, walls=planes, laws=laws, **chosen)  # type: ignore[arg-type]
+        return ParticleSolver(made, self.rows, walls=planes, laws=laws, **grouped(**chosen))  # type: ignore[arg-type]
 
 
 def relative_velocity(run: ParticleSolver) -> np.ndarray:

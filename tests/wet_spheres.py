@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from solver_options import grouped
 
 from cfddem.case.materials import Material
 from cfddem.particles.initial.packing import random_packing
@@ -30,7 +31,7 @@ def bridged(
 ) -> tuple[ParticleSolver, Bridges]:
     """A run of dry spheres with liquid on them."""
     coat(spheres, film)
-    run = ParticleSolver(spheres, pair_table([GRAIN]), laws=Laws(bridge=laws), **options)
+    run = ParticleSolver(spheres, pair_table([GRAIN]), laws=Laws(bridge=laws), **grouped(**options))
     assert run.bridges is not None
     return run, run.bridges
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -49,6 +50,44 @@ def _no_rows(pairs: int) -> np.ndarray:
     return _NO_ROWS
 
 
+@dataclass(frozen=True)
+class SolverSettings:
+    """How particles are advanced, and what is recorded.
+
+    free         1 along axes along which positions may change, else 0
+    domain       opposite corners of the region that no centre may leave; unlimited if not given [m]
+    skin         allowance of the neighbour list; tuned during the run if not given [m]
+    sort_every   sort particles by position at every this many lists, from 1000 particles on
+    record       record collisions, in `collisions`
+    energies     count energy by channel, in `energies`; slows the run down
+    check_steps  refuse time steps above the stability limit
+    after        an earlier run over the same particles and walls, whose pair memory is taken over
+    """
+
+    free: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    domain: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    skin: float | None = None
+    sort_every: int = 5
+    record: bool = False
+    energies: bool = False
+    check_steps: bool = True
+    after: ParticleSolver | None = None
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """How ranks share the particles.
+
+    communicator  path to sums, extremes and decisions over all ranks
+    division      of space among the ranks; needed if there are several. All ranks pass all particles, or each its own
+    balance       cut it anew when the work becomes unequal
+    """
+
+    communicator: Communicator = SERIAL
+    division: Bricks | None = None
+    balance: bool = False
+
+
 class ParticleSolver:
     """Particles advanced in time.
 
@@ -57,18 +96,9 @@ class ParticleSolver:
     walls    :class:`cfddem.particles.walls.shapes.Plane`, `Box`, `Cylinder`, `Cone`, `Mesh`
     laws     laws between two particles and between particles and walls
     gravity  [m/s2]
-    free     1 along axes along which positions may change, else 0
     box      length of the periodic box, which begins at 0; None along open axes [m]
-    domain   opposite corners of the region that no centre may leave; unlimited if not given [m]
-    skin     allowance of the neighbour list; tuned during the run if not given [m]
-    sort_every  sort particles by position at every this many lists, from 1000 particles on
-    record   record collisions, in `collisions`
-    energies  count energy by channel, in `energies`; slows the run down
-    check_steps  refuse time steps above the stability limit
-    after    an earlier run over the same particles and walls, whose pair memory is taken over
-    communicator  path to sums, extremes and decisions over all ranks
-    division  of space among the ranks; needed if there are several. All ranks pass all particles, or each its own
-    balance   cut it anew when the work becomes unequal
+    settings  how they are advanced, and what is recorded
+    sharing  how ranks share them
     """
 
     system: System
@@ -81,20 +111,12 @@ class ParticleSolver:
         walls: Sequence[Wall] = (),
         laws: Laws | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        free: tuple[float, float, float] = (1.0, 1.0, 1.0),
         box: tuple[float | None, float | None, float | None] = (None, None, None),
-        domain: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
-        skin: float | None = None,
-        sort_every: int = 5,
-        record: bool = False,
-        energies: bool = False,
-        check_steps: bool = True,
-        after: ParticleSolver | None = None,
-        communicator: Communicator = SERIAL,
-        division: Bricks | None = None,
-        balance: bool = False,
+        settings: SolverSettings = SolverSettings(),
+        sharing: Sharing = Sharing(),
     ) -> None:
-        self.table, self.communicator = table, communicator
+        self.table, communicator, record = table, sharing.communicator, settings.record
+        self.communicator = communicator
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()
@@ -103,13 +125,13 @@ class ParticleSolver:
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
         triangles = len(self.walls.cell_member) > 0
         choices = self.laws.choices() | {"TRIANGLES": triangles, "RECORD": record}
-        self.parameters = self.laws.parameters(gravity, free)
+        self.parameters = self.laws.parameters(gravity, settings.free)
         self.choices: Mapping[str, Any] = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
         self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
         self._touch_walls = specialise(wall_contacts, self.choices)
-        self.free = free
-        self.domain = None if domain is None else np.array(domain, float)
-        self._checking, self._accepted = check_steps, 0.0
+        self.free = settings.free
+        self.domain = None if settings.domain is None else np.array(settings.domain, float)
+        self._checking, self._accepted = settings.check_steps, 0.0
         self._next_id = communicator.largest(particles.id, default=-1) + 1
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
@@ -123,17 +145,17 @@ class ParticleSolver:
             self.features.append(kept)
         self.timers = Stopwatch()
         self.lists = NeighbourLists(
-            self.pair_fields, table, self.box, communicator=communicator, division=division, balance=balance,
-            skin=skin, sort_every=sort_every,
+            self.pair_fields, table, self.box, communicator=communicator, division=sharing.division,
+            balance=sharing.balance, skin=settings.skin, sort_every=settings.sort_every,
         )  # fmt: skip
         for field in self.laws.particle_fields():
             particles.declare(field)
         self.particles = self.lists.own(particles)
         self._reach = self._find_reach()  # of the list, over R* [-]
-        self._take_list(self.lists.first(self.particles, self.walls, self._reach, after, self.laws))
+        self._take_list(self.lists.first(self.particles, self.walls, self._reach, settings.after, self.laws))
         self._outside = 0
         self.refresh()
-        self.features += [Energies(self)] if energies else []
+        self.features += [Energies(self)] if settings.energies else []
 
     def find(self, kind: type[Kind]) -> Kind | None:
         """The feature of a kind; None if this run has none."""
@@ -143,7 +165,7 @@ class ParticleSolver:
         """The feature of a kind, such as `Bridges`; InputError if this run has none."""
         if feature := self.find(kind):
             return feature
-        raise InputError(kind.name, None, "a particle solver that has them", "see the options of ParticleSolver")
+        raise InputError(kind.name, None, "a particle solver that has them", "see its laws, and SolverSettings")
 
     @property
     def bridges(self) -> Bridges | None:

@@ -43,7 +43,7 @@ from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.neighbours import wrap
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, Sharing, SolverSettings
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.shapes import Cylinder, Plane, Turned
@@ -94,12 +94,10 @@ def parts_of(
         laws=laws,
         gravity=case.laws.gravity if dry else (0.0, 0.0, 0.0),
         box=case.column.periodic_lengths,
-        domain=_domain(case),
-        record=case.run.record_collisions,
-        energies=case.run.energy_budget,
-        communicator=communicator,
-        division=division,
-        balance=True,
+        settings=SolverSettings(
+            domain=_domain(case), record=case.run.record_collisions, energies=case.run.energy_budget
+        ),
+        sharing=Sharing(communicator=communicator, division=division, balance=True),
     )
     if dry:
         return Parts(solver, None)

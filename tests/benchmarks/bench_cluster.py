@@ -27,7 +27,7 @@ from cfddem.backend.launch import communicator as started
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, Sharing, SolverSettings
 from cfddem.particles.state import make_particles
 
 DIAMETER, STEP, STEPS, TOGETHER = 1e-3, 2e-6, 400, 10
@@ -67,7 +67,7 @@ def main(a_rank: int, film: bool) -> None:
     division = Bricks.slabs(0, [n * box[0] for n in range(1, size)]) if size > 1 else None
     run = ParticleSolver(
         spheres, pair_table([GLASS]), box=(box[0] * size, box[1], box[2]), laws=WET if film else DRY,
-        communicator=communicator, division=division, check_steps=False,
+        sharing=Sharing(communicator=communicator, division=division), settings=SolverSettings(check_steps=False),
     )  # fmt: skip
     run.advance(STEP, 3)
     ghosts, steps = run.lists.ghosts, []

@@ -28,7 +28,7 @@ from cfddem.backend.mpi import Ranks
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.ghosts import DividedDomain, packed, unpacked
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, Sharing, SolverSettings
 from cfddem.particles.state import make_particles
 
 DIAMETER, SPACING, LISTS, CALLS = 1e-3, 1.02e-3, 7, 2000
@@ -96,8 +96,8 @@ def lists(shape: Shape, a_side: int, record: Record | None = None) -> tuple[floa
     replica.tables.append(spheres.arrays)
     x, y, z = ((width * np.arange(1, n)).tolist() for n in shape)
     run: Any = ParticleSolver(
-        spheres, pair_table([GLASS]), laws=DRY, communicator=replica, division=Bricks((x, y, z)), skin=0.1 * DIAMETER,
-        check_steps=False,
+        spheres, pair_table([GLASS]), laws=DRY,
+        sharing=Sharing(communicator=replica, division=Bricks((x, y, z))), settings=SolverSettings(skin=0.1 * DIAMETER, check_steps=False),
     )  # fmt: skip
     replica.tables.append(run.edges.of(np.zeros(0, np.int32), run.particles.id))
     seconds = []

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from solver_options import grouped
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures.added_mass import near_wall
@@ -26,7 +27,7 @@ DIAMETER, WATER, VISCOSITY = 5e-4, 1000.0, 8.9e-4
 
 def sphere(velocity: float = 0.0, height: float = 1.0, **changes: object) -> ParticleSolver:
     one = make_particles([[0.0, 0.0, height]], 0.5 * DIAMETER, GLASS.density, velocity=[0.0, 0.0, velocity])
-    return ParticleSolver(one, pair_table([GLASS]), check_steps=False, **changes)  # type: ignore[arg-type]
+    return ParticleSolver(one, pair_table([GLASS]), **grouped(check_steps=False, **changes))  # type: ignore[arg-type]
 
 
 def fall(history: str, step: float, until: float) -> tuple[np.ndarray, np.ndarray]:
@@ -97,6 +98,6 @@ def test_a_restored_solver_continues_with_its_memory() -> None:
 
 def test_a_fixed_sphere_stays() -> None:
     one = make_particles([[0.0, 0.0, 1.0]], 0.5 * DIAMETER, GLASS.density, fixed=True)
-    run = ParticleSolver(one, pair_table([GLASS]), check_steps=False)
+    run = ParticleSolver(one, pair_table([GLASS]), settings=SolverSettings(check_steps=False))
     QuiescentFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), gravity=(0.0, 0.0, -9.81)).advance(1e-3, 5)
     assert run.particles.position[0, 2] == 1.0

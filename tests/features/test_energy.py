@@ -21,7 +21,7 @@ from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.initial.packing import lattice
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy as of_spheres
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
@@ -56,8 +56,8 @@ def box(
              for axis in range(3) for sign in (1.0, -1.0)]  # fmt: skip
     chosen = laws or Laws(film=viscosity > 0.0)
     return ParticleSolver(
-        spheres, pair_table([ROUGH]), walls=walls, laws=chosen, gravity=(0.0, 0.0, -gravity), energies=True,
-        record=record,
+        spheres, pair_table([ROUGH]), walls=walls, laws=chosen, gravity=(0.0, 0.0, -gravity),
+        settings=SolverSettings(energies=True, record=record),
     )  # fmt: skip
 
 
@@ -112,7 +112,9 @@ def test_every_collision_says_what_it_lost_and_to_what() -> None:
     places = np.array([[0.0, 0.0, 0.0], [3.0 * radius, 0.8 * radius, 0.0]])
     velocity = np.array([[0.0, 0.0, 0.0], [-speed, 0.0, 0.0]])
     pair = make_particles(places, radius, 2500.0, velocity=velocity, viscosity=5e-3)
-    run = ParticleSolver(pair, pair_table([ROUGH]), laws=Laws(film=True), record=True, energies=True)
+    run = ParticleSolver(
+        pair, pair_table([ROUGH]), laws=Laws(film=True), settings=SolverSettings(record=True, energies=True)
+    )
     assert run.collisions is not None and run.energies is not None
     before, step = of_spheres(pair), run.recommended_step(speed)
     run.advance(step, int(4.0 * radius / speed / step))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from solver_options import grouped
 
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
@@ -45,7 +46,7 @@ def particles(
     if "liquid" in state:
         thickness, choices["bridge"] = state.pop("liquid")
         coat(made, thickness)
-    return ParticleSolver(made, pair_table(materials), laws=Laws(**choices), **state)
+    return ParticleSolver(made, pair_table(materials), laws=Laws(**choices), **grouped(**state))
 
 
 def stirred_dense_bed(film: bool, speed: float = 0.3) -> ParticleSolver:

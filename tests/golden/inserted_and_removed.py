@@ -6,7 +6,7 @@ import numpy as np
 
 from cfddem.particles import feeding
 from cfddem.particles.interactions.laws import Laws
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.walls.shapes import Plane
 from golden.building import particles, stirred_dense_bed
 from golden.many_particles import after, swarm
@@ -54,7 +54,14 @@ def followed_by_another_run() -> State:
     first = swarm()
     first.advance(1e-6, 30)
     places = first.particles
-    run = ParticleSolver(places, first.table, laws=Laws(), gravity=(0.0, 0.0, -9.81), box=tuple(first.box), after=first)
+    run = ParticleSolver(
+        places,
+        first.table,
+        laws=Laws(),
+        gravity=(0.0, 0.0, -9.81),
+        box=tuple(first.box),
+        settings=SolverSettings(after=first),
+    )
     return after(run)
 
 

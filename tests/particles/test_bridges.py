@@ -18,7 +18,7 @@ from cfddem.particles.interactions.bridge_solution import held_gap, resistance_i
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.slots import BridgeState
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import bridge, capillary, capillary_pull, contact, lubrication
@@ -262,10 +262,12 @@ def test_a_bridge_without_liquid_does_not_pull(pull: str, gap: float) -> None:
 def test_a_run_after_another_has_its_bridges() -> None:
     """What a bridge remembers, its resistance below h_min for instance, is that of its laws."""
     run, bridges = pair(0.0, FILM)
-    again = ParticleSolver(run.particles, run.table, laws=run.laws, after=run)
+    again = ParticleSolver(run.particles, run.table, laws=run.laws, settings=SolverSettings(after=run))
     assert again.bridges is not None and again.bridges.volume.tolist() == bridges.volume.tolist()
     with pytest.raises(InputError, match="same liquid bridges"):
-        ParticleSolver(run.particles, run.table, laws=Laws(bridge=BridgeLaws(viscosity=3.0)), after=run)
+        ParticleSolver(
+            run.particles, run.table, laws=Laws(bridge=BridgeLaws(viscosity=3.0)), settings=SolverSettings(after=run)
+        )
 
 
 @pytest.mark.slow

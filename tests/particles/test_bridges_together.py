@@ -15,7 +15,7 @@ from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy, make_particles
 from closures import bridge
 from closures.lubrication import film_strength
@@ -42,7 +42,9 @@ def chain(count: int, held: bool, tolerance: float = TIGHT) -> ParticleSolver:
     made = make_particles(places, RADIUS, GRAIN.density, fixed=held & (np.arange(count) == 0))
     coat(made, FILM)
     laws = Laws(bridge=SYRUP, film_tolerance=tolerance)
-    return without_pull(ParticleSolver(made, pair_table([GRAIN]), laws=laws, check_steps=False, skin=RADIUS))
+    return without_pull(
+        ParticleSolver(made, pair_table([GRAIN]), laws=laws, settings=SolverSettings(check_steps=False, skin=RADIUS))
+    )
 
 
 class Direct:
@@ -190,7 +192,11 @@ def test_a_film_and_a_bridge_of_one_pair_share_its_impulse_by_their_resistances(
         made = make_particles(places, RADIUS, GRAIN.density, viscosity=0.5 * SYRUP.viscosity)
         coat(made, FILM)
         laws = Laws(film=True, film_motions="full", bridge=SYRUP, film_tolerance=TIGHT)
-        run = without_pull(ParticleSolver(made, pair_table([GRAIN]), laws=laws, check_steps=False, skin=RADIUS))
+        run = without_pull(
+            ParticleSolver(
+                made, pair_table([GRAIN]), laws=laws, settings=SolverSettings(check_steps=False, skin=RADIUS)
+            )
+        )
         draw, speed = np.random.default_rng(2), 1e-3 * GAP / step
         run.particles.velocity[:] = draw.normal(0.0, speed, (4, 3))
         run.particles.spin[:] = draw.normal(0.0, speed / RADIUS, (4, 3))

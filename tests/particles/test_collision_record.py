@@ -18,7 +18,7 @@ from cfddem.particles.collision_events import COLLISION
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.plotting.curves import collisions
 from cfddem.plotting.report_page import page
@@ -83,7 +83,7 @@ def test_the_record_says_how_close_a_pair_came(speed: float, meets: bool) -> Non
     places = np.array([[0.0, 0.0, 0.0], [2.0 * radius + 0.51 * radius, 0.0, 0.0]])
     velocity = np.array([[0.0, 0.0, 0.0], [-speed, 0.0, 0.0]])
     pair = make_particles(places, radius, 2500.0, velocity=velocity, viscosity=viscosity)
-    run = ParticleSolver(pair, pair_table([material]), laws=Laws(film=True), record=True)
+    run = ParticleSolver(pair, pair_table([material]), laws=Laws(film=True), settings=SolverSettings(record=True))
     assert run.collisions is not None
     step = run.recommended_step(speed)
     run.advance(step, int(0.5 * radius / speed / step))

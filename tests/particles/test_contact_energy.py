@@ -13,7 +13,7 @@ from impacts import STEP, Pair, kinetic_energy
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import PAIR, pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from closures import contact, timescales
 
@@ -77,7 +77,9 @@ class Contacts:
         """Largest kinetic energy that each pair has shown, over what it brought, less one."""
         skin = 0.5 * self.particles.radius.min()
         # the step belongs to the pairs that meet, which are not the lightest
-        run = ParticleSolver(self.particles, self.table, laws=Laws(spring=spring), skin=skin, check_steps=False)
+        run = ParticleSolver(
+            self.particles, self.table, laws=Laws(spring=spring), settings=SolverSettings(skin=skin, check_steps=False)
+        )
         assert len(run.edges.first) == self.count
         pairs = run.edges.first
         brought = kinetic_energy(self.particles)

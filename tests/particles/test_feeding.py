@@ -14,7 +14,7 @@ from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.initial.packing import normal, random_packing
 from cfddem.particles.initial.tables import read_particles
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 
@@ -121,7 +121,9 @@ def test_an_earlier_run_is_remembered_by_the_next() -> None:
     down = (9.81 * 0.2, 0.0, -9.81)
 
     def run(after: ParticleSolver | None, sphere: object) -> ParticleSolver:
-        return ParticleSolver(sphere, pair_table([GRAIN]), walls=[Plane()], gravity=down, after=after)  # type: ignore[arg-type]
+        return ParticleSolver(
+            sphere, pair_table([GRAIN]), walls=[Plane()], gravity=down, settings=SolverSettings(after=after)
+        )  # type: ignore[arg-type]
 
     first = run(None, make_particles([[0.0, 0.0, 0.4999 * DIAMETER]], 0.5 * DIAMETER, 2500.0))
     first.advance(first.recommended_step(0.01), 200)

@@ -10,7 +10,7 @@ from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures.restitution import davis_sitison
@@ -33,7 +33,9 @@ def rebound(diameter: float, liquid: str, film: float, velocity: float, density:
         wall_share=1.0, wall_film=film, wall_patch=4.0 * diameter, film_density=density,
     )  # fmt: skip
     coat(sphere, 0.0)
-    run = ParticleSolver(sphere, pair_table([GLASS]), laws=Laws(bridge=laws), walls=[Plane()], skin=diameter)
+    run = ParticleSolver(
+        sphere, pair_table([GLASS]), laws=Laws(bridge=laws), walls=[Plane()], settings=SolverSettings(skin=diameter)
+    )
     for _ in range(400):
         run.advance(1e-7, 200)
         if run.particles.position[0, 2] > 0.5 * diameter + film:

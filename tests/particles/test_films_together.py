@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from in_process_ranks import on_ranks
 from scipy.sparse.linalg import spsolve
+from solver_options import grouped
 from test_ghosts import assert_same_bits, joined, state
 
 from cfddem.backend.communicator import Communicator
@@ -21,7 +22,7 @@ from cfddem.particles.bricks import Bricks
 from cfddem.particles.interactions.film import WEAK
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import tangential_lubrication as tangential
@@ -47,7 +48,7 @@ def row_of(spheres: int, held: list[int], tolerance: float = TIGHT, **options: A
     fixed = np.isin(np.arange(spheres), held)
     made = make_particles(places, RADIUS, SPHERE.density, viscosity=VISCOSITY, fixed=fixed)
     laws = Laws(film=True, film_tolerance=tolerance)
-    return ParticleSolver(made, pair_table([SPHERE]), laws=laws, check_steps=False, **options)
+    return ParticleSolver(made, pair_table([SPHERE]), laws=laws, **grouped(check_steps=False, **options))
 
 
 def gaps_of(run: ParticleSolver) -> np.ndarray:
@@ -269,7 +270,9 @@ def network(motions: str, count: int = 300, tolerance: float = TIGHT, large: boo
     if motions != "normal":
         spheres.spin[:] = draw.normal(0.0, 0.004 / RADIUS, x.shape)
     laws = Laws(film=True, film_motions=motions, film_tolerance=tolerance)
-    run = ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, box=tuple(box), check_steps=False, **options)
+    run = ParticleSolver(
+        spheres, pair_table([SPHERE]), laws=laws, box=tuple(box), **grouped(check_steps=False, **options)
+    )
     return films_only(run)
 
 
@@ -359,7 +362,11 @@ def test_a_large_sphere_among_small_ones_is_that_of_a_direct_solution(plane: boo
     spheres.spin[:] = draw.normal(0.0, 0.01 / RADIUS, places.shape)
     laws = Laws(film=True, film_motions="full", film_tolerance=TIGHT)
     walls = [Plane()] if plane else []
-    run = films_only(ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, walls=walls, check_steps=False))
+    run = films_only(
+        ParticleSolver(
+            spheres, pair_table([SPHERE]), laws=laws, walls=walls, settings=SolverSettings(check_steps=False)
+        )
+    )
     assert int((run.edges.resistance > 0.0).sum()) > 100
     lost, velocity = compare(run, 1e-6, True)
     assert lost < 1e-6
@@ -377,7 +384,9 @@ def test_a_cluster_that_turns_as_a_rigid_body_feels_nothing(motions: str) -> Non
     spheres.velocity[:] = 0.1 + np.cross(turn, places)
     spheres.spin[:] = turn
     laws = Laws(film=True, film_motions=motions)
-    run = films_only(ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, check_steps=False))
+    run = films_only(
+        ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, settings=SolverSettings(check_steps=False))
+    )
     before = run.particles.velocity.copy(), run.particles.spin.copy()
     run.advance(1e-6)
     assert np.abs(run.particles.velocity - before[0]).max() < 1e-14
@@ -399,7 +408,9 @@ def test_any_cluster_loses_energy_and_keeps_momentum(
     spheres.velocity[:] = draw.normal(0.0, 1e-3, places.shape)
     spheres.spin[:] = draw.normal(0.0, 1e-3 / RADIUS, places.shape)
     laws = Laws(film=True, film_motions="full", film_tolerance=tolerance)
-    run = films_only(ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, check_steps=False))
+    run = films_only(
+        ParticleSolver(spheres, pair_table([SPHERE]), laws=laws, settings=SolverSettings(check_steps=False))
+    )
     mass = run.particles.mass[:, None]
     for _ in range(3):
         began = run.edges.film_owed != 0.0

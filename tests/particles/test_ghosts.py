@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from example_case import TEXT as EXAMPLE
 from in_process_ranks import Rank, on_ranks
+from solver_options import grouped
 
 from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import SERIAL, Communicator
@@ -26,7 +27,7 @@ from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, Sharing, SolverSettings
 from cfddem.particles.state import Particles, make_particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.shapes import Box, Plane
@@ -119,7 +120,7 @@ def settings(film: bool, walls: bool, liquid: bool = False) -> tuple[Particles, 
 
 def finished(spheres: Particles, given: dict[str, Any], steps: int, **others: Any) -> ParticleSolver:
     """The run after some steps."""
-    run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), check_steps=False, **given, **others)
+    run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), **grouped(check_steps=False, **given, **others))
     run.advance(STEP, steps)
     return run
 
@@ -248,8 +249,8 @@ def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
         first = make_particles([[1e-3, 2e-3, 5e-3], [4e-3, 2e-3, 5e-3]], 0.5e-3, GLASS.density)
         division = Bricks.slabs(0, [2.5e-3]) if communicator.size == 2 else None
         run = ParticleSolver(
-            first, pair_table([GLASS]), walls=[Plane()], gravity=(0.0, 0.0, -9.81), skin=2e-4,
-            communicator=communicator, division=division,
+            first, pair_table([GLASS]), walls=[Plane()], gravity=(0.0, 0.0, -9.81), settings=SolverSettings(skin=2e-4),
+            sharing=Sharing(communicator=communicator, division=division),
         )  # fmt: skip
         feed = Feed(
             3e4, (0.0, 0.0, 6e-3), (5e-3, 4e-3, 0.0), lambda n, draw: draw.uniform(6e-4, 1e-3, n), GLASS.density,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import call
+from solver_options import grouped
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
@@ -48,7 +49,7 @@ def pair(law: ContactLaw = LAW, speed: float = 0.1, slide: float = 0.0, **option
     position, velocity = np.zeros((2, 3)), np.zeros((2, 3))
     position[1, 0], velocity[:, 0], velocity[0, 1] = 2.02 * RADIUS, (speed, -speed), slide
     made = make_particles(position, RADIUS, 2500.0, velocity=velocity)
-    return ParticleSolver(made, pair_table([GLASS]), laws=Laws(contact=law), skin=0.2 * RADIUS, **options)
+    return ParticleSolver(made, pair_table([GLASS]), laws=Laws(contact=law), **grouped(skin=0.2 * RADIUS, **options))
 
 
 def collide(run: ParticleSolver) -> None:

@@ -18,7 +18,7 @@ from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.case.walls import forget_shape
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.stl import read_stl
@@ -48,7 +48,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, 
 def gap(wall: Wall, place: list[float]) -> float:
     """Gap between a bead and a wall [m]."""
     bead = make_particles([place], RADIUS, 2500.0)
-    run = ParticleSolver(bead, pair_table([GLASS]), walls=[wall], skin=5.0 * RADIUS)
+    run = ParticleSolver(bead, pair_table([GLASS]), walls=[wall], settings=SolverSettings(skin=5.0 * RADIUS))
     return float(run.gap.min())
 
 

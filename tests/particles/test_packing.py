@@ -24,7 +24,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.neighbours import wrap
 from cfddem.particles.pair_graph import HOME
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import Particles, make_particles
 
 
@@ -153,7 +153,9 @@ GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, roughness=1e-6
 def listed(spheres: Particles, film: bool, skin: float, box: np.ndarray) -> ParticleSolver:
     """A run over these spheres, as it begins: with its first list."""
     sides = tuple(length if np.isfinite(length) else None for length in box)
-    return ParticleSolver(spheres, pair_table([GLASS]), laws=Laws(film=film), box=sides, skin=skin)  # type: ignore[arg-type]
+    return ParticleSolver(
+        spheres, pair_table([GLASS]), laws=Laws(film=film), box=sides, settings=SolverSettings(skin=skin)
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 15.0])
@@ -205,7 +207,9 @@ def test_memory_goes_with_the_pair_through_lists_and_sorting(film: bool, monkeyp
     centres, box = random_packing(mono(400, 1e-3), 0.55, seed=9)
     shuffled = centres[np.random.default_rng(1).permutation(len(centres))]
     spheres = make_particles(shuffled, 0.5e-3, 2500.0, viscosity=1e-3 if film else 0.0)
-    run = ParticleSolver(spheres, pair_table([GLASS]), laws=Laws(film=film), box=tuple(box), sort_every=1)
+    run = ParticleSolver(
+        spheres, pair_table([GLASS]), laws=Laws(film=film), box=tuple(box), settings=SolverSettings(sort_every=1)
+    )
 
     def expected() -> tuple[np.ndarray, np.ndarray]:
         one, other = (run.particles.id[row].astype(float) for row in (run.edges.first, run.edges.second))

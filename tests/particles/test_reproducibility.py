@@ -9,7 +9,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.shapes import Cylinder, Plane
@@ -59,8 +59,7 @@ def rain(
         laws=Laws(film=film),
         gravity=(0.0, 0.0, -9.81),
         box=(None if DRUM in walls else SIDE, None if DRUM in walls else SIDE, None),
-        skin=skin,
-        sort_every=sort_every,
+        settings=SolverSettings(skin=skin, sort_every=sort_every),
     )
 
 

@@ -23,7 +23,7 @@ from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.shear_film import logarithm
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import tangential_lubrication as film
@@ -119,7 +119,7 @@ def pair(radii: tuple[float, float], gap: float, velocity: Any, spin: Any, visco
     """Two spheres, the first in direction `ALONG` from the second."""
     places = [ALONG * (sum(radii) + gap), np.zeros(3)]
     spheres = make_particles(places, radii, GLASS.density, velocity=velocity, spin=spin, viscosity=viscosity)
-    return ParticleSolver(spheres, pair_table([GLASS]), laws=FULL, check_steps=False)
+    return ParticleSolver(spheres, pair_table([GLASS]), laws=FULL, settings=SolverSettings(check_steps=False))
 
 
 @pytest.mark.parametrize("radii", [(1e-3, 1e-3), (1e-3, 4e-3)])
@@ -154,7 +154,7 @@ def cluster(viscosity: float) -> ParticleSolver:
         places, radii, GLASS.density, velocity=draw.normal(0.0, 0.01, grid.shape),
         spin=draw.normal(0.0, 20.0, grid.shape), viscosity=viscosity,
     )  # fmt: skip
-    return ParticleSolver(spheres, pair_table([GLASS]), laws=FULL, check_steps=False)
+    return ParticleSolver(spheres, pair_table([GLASS]), laws=FULL, settings=SolverSettings(check_steps=False))
 
 
 @pytest.mark.parametrize("viscosity", [1e-3, 1.0, 1e3, 1e6])
@@ -233,7 +233,9 @@ def test_a_sphere_at_a_wall(motions: str) -> None:
 def test_work_of_all_films_is_the_change_of_energy() -> None:
     """Kinetic energy lost within round-off of what both kinds of film have taken."""
     spheres = cluster(1.0).particles
-    run = ParticleSolver(spheres, pair_table([GLASS]), laws=FULL, energies=True, check_steps=False)
+    run = ParticleSolver(
+        spheres, pair_table([GLASS]), laws=FULL, settings=SolverSettings(energies=True, check_steps=False)
+    )
     start = kinetic_energy(run.particles)
     run.advance(1e-6, 50)
     assert run.energies is not None

@@ -7,13 +7,14 @@ import re
 
 import numpy as np
 import pytest
+from solver_options import grouped
 
 from cfddem.backend.errors import RunFailed, UnstableStep
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.time_scales import check_step
 from cfddem.particles.walls.shapes import Plane
@@ -101,7 +102,7 @@ def energy_gain(share: float) -> float:
     chain = [[2.0 * RADIUS * 0.98 * n, 0.0, 0.0] for n in range(8)]
     fixed = [True, *[False] * 6, True]
     spheres = make_particles(chain, RADIUS, GLASS.density, fixed=fixed)
-    run = ParticleSolver(spheres, pair_table([elastic]), skin=10.0 * RADIUS, check_steps=False)
+    run = ParticleSolver(spheres, pair_table([elastic]), settings=SolverSettings(skin=10.0 * RADIUS, check_steps=False))
     run.particles.velocity[1:7, 0] = 1e-3 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     run.refresh()
     limit = run.time_scales().overlap
@@ -144,7 +145,7 @@ def test_step_of_the_standard_bed_passes() -> None:
 def lone(**options: object) -> ParticleSolver:
     """One sphere above a floor."""
     sphere = make_particles([[0.0, 0.0, 3.0 * RADIUS]], RADIUS, GLASS.density, velocity=[0.0, 0.0, -0.5])
-    return ParticleSolver(sphere, pair_table([GLASS]), gravity=(0.0, 0.0, -9.81), **options)  # type: ignore[arg-type]
+    return ParticleSolver(sphere, pair_table([GLASS]), gravity=(0.0, 0.0, -9.81), **grouped(**options))  # type: ignore[arg-type]
 
 
 def test_particle_that_is_no_number_ends_the_run() -> None:

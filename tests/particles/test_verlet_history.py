@@ -12,6 +12,7 @@ import math
 import numpy as np
 import pytest
 from impacts import STEP, Pair, until_apart
+from solver_options import grouped
 
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.contacts.linear import LINEAR
@@ -40,7 +41,7 @@ def grain_and_large(
         [position, *centres], [GRAIN, ratio * GRAIN, ratio * GRAIN], solid.density, fixed=[False, True, True]
     )
     return ParticleSolver(
-        made, pair_table([solid]), laws=laws, gravity=(0.0, 0.0, -GRAVITY), skin=ratio * GRAIN, **options
+        made, pair_table([solid]), laws=laws, gravity=(0.0, 0.0, -GRAVITY), **grouped(skin=ratio * GRAIN, **options)
     )  # type: ignore[arg-type]
 
 
@@ -157,7 +158,7 @@ def moved(
         material=given.material[order],
         viscosity=pair.viscosity,
     )
-    return ParticleSolver(made, pair.rows, laws=laws, **{"skin": max(pair.radii), **options})  # type: ignore[arg-type]
+    return ParticleSolver(made, pair.rows, laws=laws, **grouped(**{"skin": max(pair.radii), **options}))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("film", [False, True], ids=["dry", "film"])

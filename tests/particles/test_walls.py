@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from solver_options import grouped
 
 from cfddem.backend.communicator import SERIAL
 from cfddem.backend.errors import InputError
@@ -15,7 +16,7 @@ from cfddem.case.materials import Material
 from cfddem.case.walls import CaseWall
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Plane
@@ -41,7 +42,9 @@ def sphere(
         walls=walls,
         laws=Laws(film=film > 0.0),
         gravity=gravity,
-        record=film > 0.0,  # recording changes no motion; all spheres with films share one set of loops
+        settings=SolverSettings(
+            record=film > 0.0
+        ),  # recording changes no motion; all spheres with films share one set of loops
     )
 
 
@@ -349,10 +352,10 @@ def test_walls_repeat_in_a_periodic_box() -> None:
     made = make_particles([[0.01, 0.0, 0.0]], RADIUS, SOLID.density)
     along = {"box": (0.02, None, None), "skin": 1e-4}
     for wall in (Plane(point=(0.0, 0.0, -RADIUS)), Cylinder(axis=(1.0, 0.0, 0.0), radius=0.02)):
-        ParticleSolver(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
+        ParticleSolver(made, pair_table([SOLID]), walls=[wall], **grouped(**along))  # type: ignore[arg-type]
     for wall in (Plane(normal=(1.0, 0.0, 0.0)), Cylinder(radius=0.02), sheet(2)):
         with pytest.raises(InputError, match="periodic"):
-            ParticleSolver(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
+            ParticleSolver(made, pair_table([SOLID]), walls=[wall], **grouped(**along))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

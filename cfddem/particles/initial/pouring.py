@@ -13,7 +13,7 @@ from cfddem.backend.errors import RunFailed
 from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import Solid, pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import Particles, kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from cfddem.particles.walls.wall import Wall
@@ -121,7 +121,7 @@ def poured_bed(
         laws=laws,
         gravity=(0.0, 0.0, -gravity),
         box=place.periodic,
-        check_steps=False,  # steps follow the time_scales here
+        settings=SolverSettings(check_steps=False),  # steps follow the time_scales here
     )
     pouring = _Pouring(run, float(np.sum(loose.mass * gravity * (places[:, 2] - corner[2]))), gravity, height, patience)
     pouring.progress, pouring.at_rest = progress, at_rest

@@ -30,7 +30,7 @@ from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
@@ -289,7 +289,7 @@ def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> 
     place = [[0.5 * WIDTH, 0.5 * WIDTH, RELEASE + RADIUS]]
     run = ParticleSolver(
         make_particles(place, RADIUS, NYLON.density), pair_table([NYLON]), walls=[FLOOR, *SIDES, LID],
-        laws=Laws(film=True), skin=RADIUS, check_steps=False,
+        laws=Laws(film=True), settings=SolverSettings(skin=RADIUS, check_steps=False),
     )  # fmt: skip
     beside = None if walls == "none" else WallDrag([FLOOR, *SIDES, LID], walls, film=True)
     oil = QuiescentFluid(

@@ -14,7 +14,7 @@ from cfddem.case.materials import Material
 from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import contact, lubrication
@@ -80,10 +80,12 @@ def stage(
         table,
         walls=[WALL] if wall else [],
         laws=laws,
-        free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
-        skin=8.0 * setting.reduced_radius,
-        check_steps=False,  # the step is chosen here
-        record=True,
+        settings=SolverSettings(
+            free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
+            skin=8.0 * setting.reduced_radius,
+            check_steps=False,
+            record=True,
+        ),
     )
 
 

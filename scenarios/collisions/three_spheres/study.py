@@ -34,7 +34,7 @@ from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeFilm, BridgeLaws, BridgePull
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from closures import contact, timescales
 from closures.bridge import constant_capillary, davis_tangential, deforming_potential, deforming_share
@@ -390,7 +390,9 @@ def _spheres(state: np.ndarray, numbers: Numbers, overlap: float, films: np.ndar
         parameters={"touch": touch},
     )
     # the steps are chosen here: short in contact, long where only films act
-    return ParticleSolver(spheres, pair_table([solid]), laws=Laws(bridge=laws), check_steps=False)
+    return ParticleSolver(
+        spheres, pair_table([solid]), laws=Laws(bridge=laws), settings=SolverSettings(check_steps=False)
+    )
 
 
 def _release(run: ParticleSolver) -> None:

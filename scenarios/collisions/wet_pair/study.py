@@ -27,7 +27,7 @@ from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, blank, label, legend, panels, shades
 from closures import contact, timescales
@@ -237,7 +237,7 @@ def integrate_in_engine(pair: Pair, liquid: BridgeLaws, solid: Material, angle: 
     )
     coat(two, 0.5 * pair.film)
     # the steps are chosen here: they follow the film, whose resistance changes as it opens and closes
-    run = ParticleSolver(two, pair_table([solid]), laws=Laws(bridge=liquid), check_steps=False)
+    run = ParticleSolver(two, pair_table([solid]), laws=Laws(bridge=liquid), settings=SolverSettings(check_steps=False))
     bridges = run.feature(Bridges)
     stiffness = hertz_stiffness(pair.modulus, 0.5 * pair.radius)
     short = IMPACT_STEP * timescales.hertz_time(0.5 * pair.mass, stiffness, pair.speed)

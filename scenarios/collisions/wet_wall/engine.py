@@ -15,7 +15,7 @@ from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge_law import BridgeLaws, BridgePull
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import capillary, timescales
@@ -170,7 +170,7 @@ def _sphere(wet: Wet, solids: tuple[Material, Material], speed: float, along: fl
     # the steps are chosen here: short in contact, long where only the liquid acts
     return ParticleSolver(
         sphere, pair_table(list(pair)), walls=[Plane(material=1)], laws=Laws(bridge=liquid if wet.film else None),
-        gravity=(0.0, 0.0, -wet.gravity), check_steps=False,
+        gravity=(0.0, 0.0, -wet.gravity), settings=SolverSettings(check_steps=False),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from cfddem.case.materials import Material
 from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import contact
@@ -162,7 +162,7 @@ def drop(stiffness: float, restitution: float, until: float, samples: int = 400)
         walls=[Plane()],
         laws=Laws(contact=LINEAR.with_parameters(normal_stiffness=stiffness, tangential_stiffness=stiffness)),
         gravity=DOWN,
-        skin=3.0 * DROP_HEIGHT,
+        settings=SolverSettings(skin=3.0 * DROP_HEIGHT),
     )
     whole = math.ceil(until / samples / (0.02 * math.pi * math.sqrt(float(sphere.mass[0]) / stiffness)))
     time, height = [0.0], [DROP_HEIGHT]
@@ -264,7 +264,7 @@ def strike(angle: float, linear: bool = False) -> dict[str, float]:
     laws = (
         Laws(contact=LINEAR.with_parameters(normal_stiffness=1.72e7, tangential_stiffness=1.48e7)) if linear else Laws()
     )
-    run = ParticleSolver(sphere, table, walls=[Plane(material=1)], laws=laws, skin=radius)
+    run = ParticleSolver(sphere, table, walls=[Plane(material=1)], laws=laws, settings=SolverSettings(skin=radius))
     step = run.time_scales(down).hertz
     while not (run.time > 10 * step and run.gap[0] > 0.0):
         run.advance(step)

@@ -20,7 +20,7 @@ import numpy as np
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import kinetic_energy
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from scenarios.validation.particles.granular_beds import SUSPENDED, suspension
@@ -176,7 +176,11 @@ def sheared(
         spheres.velocity[upper, 0] = SPEED
     laws = Laws(film=True, film_motions=motions, cutoff_ratio=cutoff_ratio)
     run = ParticleSolver(
-        spheres, pair_table([solid]), laws=laws, box=(width, depth, None), energies=True, check_steps=False
+        spheres,
+        pair_table([solid]),
+        laws=laws,
+        box=(width, depth, None),
+        settings=SolverSettings(energies=True, check_steps=False),
     )
     lid = run.particles.id[upper]
     height = _height(run, lid)
