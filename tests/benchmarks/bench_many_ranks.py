@@ -97,7 +97,8 @@ def lists(shape: Shape, a_side: int, record: Record | None = None) -> tuple[floa
     x, y, z = ((width * np.arange(1, n)).tolist() for n in shape)
     run: Any = ParticleSolver(
         spheres, pair_table([GLASS]), laws=DRY,
-        sharing=Sharing(communicator=replica, division=Bricks((x, y, z))), settings=SolverSettings(skin=0.1 * DIAMETER, check_steps=False),
+        sharing=Sharing(communicator=replica, division=Bricks((x, y, z))),
+        settings=SolverSettings(skin=0.1 * DIAMETER, check_steps=False),
     )  # fmt: skip
     replica.tables.append(run.edges.of(np.zeros(0, np.int32), run.particles.id))
     seconds = []
