@@ -201,8 +201,11 @@ def test_closures_import_nothing_of_the_machine() -> None:
             assert not [each for each in imports(name) if not each.startswith("closures")], name
 
 
-def test_only_the_command_line_imports_scenarios() -> None:
+def test_only_the_command_line_imports_scenarios_and_nothing_imports_it() -> None:
+    """`cli` is the top room, above `scenarios`, whose commands it offers."""
     for name in modules():
+        if room(name) != "cli" and name != "cfddem.__main__":
+            assert not [each for each in imports(name) if room(each) == "cli"], name
         if name.startswith("cfddem") and room(name) != "cli":
             assert not [each for each in imports(name) if each.startswith("scenarios")], name
 
