@@ -76,9 +76,6 @@ class Plane(Wall):
     def distance(self, points: Array) -> Array:
         return np.asarray((points - np.array(self.point)) @ unit(self.normal))
 
-    def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
-        return np.asarray(self.distance(points) < 0.0)
-
     def speed_of_spin(self) -> float:
         return 0.0
 
@@ -141,9 +138,13 @@ class Tapered(Round):
     """A round wall between two circles, each with a radius, or without end.
 
     radius  of the lower end [m]
+    length  along the axis; None without end [m]
+    caps    whether it has flat ends
     """
 
     radius: float
+    length: float | None
+    caps = False
 
     @property
     def radii(self) -> tuple[float, float]:
@@ -151,21 +152,11 @@ class Tapered(Round):
         return self.radius, self.radius
 
     @property
-    def height(self) -> float | None:
-        """Length along the axis; None without end [m]."""
-        raise NotImplementedError
-
-    @property
-    def has_caps(self) -> bool:
-        """Whether it has flat ends."""
-        return False
-
-    @property
     def side(self) -> Solid:
         return Solid(None)
 
     def frame(self) -> tuple[np.ndarray, float]:
-        return np.array([self.point, np.add(self.point, (self.height or 0.0) * unit(self.axis))]), max(self.radii)
+        return np.array([self.point, np.add(self.point, (self.length or 0.0) * unit(self.axis))]), max(self.radii)
 
     def _ring(self, end: float, radius: float, count: int) -> Array:
         """Points on a circle about the axis, at a distance from its lower end (count, 3) [m]."""
@@ -173,15 +164,15 @@ class Tapered(Round):
         return np.asarray(np.array(self.point) + end * axis + radius * circle(axis, count))
 
     def corners(self) -> Array:
-        low, high = self._ring(0.0, self.radii[0], SIDES), self._ring(self.height or 0.0, self.radii[1], SIDES)
+        low, high = self._ring(0.0, self.radii[0], SIDES), self._ring(self.length or 0.0, self.radii[1], SIDES)
         after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
         return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
 
     def extent(self) -> Array | None:
-        if self.height is None:
+        if self.length is None:
             return None
         axis = unit(self.axis)
-        ends = np.array([self.point, np.array(self.point) + self.height * axis])
+        ends = np.array([self.point, np.array(self.point) + self.length * axis])
         reach = np.outer(self.radii, np.sqrt(np.maximum(1.0 - axis**2, 0.0)))
         return np.array([(ends - reach).min(axis=0), (ends + reach).max(axis=0)])
 
@@ -193,7 +184,7 @@ class Tapered(Round):
 
     def distance(self, points: Array) -> Array:
         """Of an open wall."""
-        (height, radius), length = self._about_axis(points), self.height or 0.0
+        (height, radius), length = self._about_axis(points), self.length or 0.0
         own, top = self.radii
         slope = top - own
         along = np.clip(((radius - own) * slope + height * length) / (slope**2 + length**2), 0.0, 1.0)
@@ -201,9 +192,9 @@ class Tapered(Round):
 
     def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
         if not self.is_open:
-            return np.asarray(self.distance(points) < 0.0)
+            return super().closes(points)
         height, radius = self._about_axis(points)
-        length, (own, top) = self.height or 0.0, self.radii
+        length, (own, top) = self.length or 0.0, self.radii
         there = own + (top - own) * height / length
         beside = (height >= 0.0) & (height <= length)
         return np.asarray(beside & ((radius > there) if side == "outside" else (radius < there)))
@@ -211,7 +202,7 @@ class Tapered(Round):
     def speed_of_spin(self) -> float:
         reach, arm = max(self.radii), 0.0
         if not self._spins_along(self.axis, self.point):
-            reach += self.height or 0.0
+            reach += self.length or 0.0
             arm = math.hypot(*np.subtract(self.point if self.centre is None else self.centre, self.point))
         return math.hypot(*self.spin) * (reach + arm)
 
@@ -225,16 +216,16 @@ class Tapered(Round):
         return (*self.point[:2], 0.5 * sum(self.radii)) if upright else None
 
     def _ends(self, far: float) -> tuple[float, float]:
-        return (-far, far) if self.height is None else (0.0, self.height)
+        return (-far, far) if self.length is None else (0.0, self.length)
 
     def polygons(self, far: float) -> list[Array]:
         low, high = (self._ring(end, radius, AROUND) for end, radius in zip(self._ends(far), self.radii))
         side = np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1)
-        return [side, np.stack([low, high])] if self.has_caps else [side]
+        return [side, np.stack([low, high])] if self.caps else [side]
 
     def sketch(self, far: float) -> Sketch:
         axis, point = unit(self.axis)[::2], np.array(self.point)[::2]
-        if math.hypot(*axis) < 0.5 and self.height is not None:
+        if math.hypot(*axis) < 0.5 and self.length is not None:
             angle = np.linspace(0.0, 2.0 * math.pi, 100)
             return Sketch([point + self.radii[0] * np.stack([np.cos(angle), np.sin(angle)], axis=1)], [])
         normal = np.array([-axis[1], axis[0]])
@@ -242,7 +233,7 @@ class Tapered(Round):
             np.array([point + end * axis + side * radius * normal for end, radius in zip(self._ends(far), self.radii)])
             for side in (-1.0, 1.0)
         )
-        return Sketch([left, right, *(np.array(ends) for ends in zip(left, right) if self.has_caps)], [])
+        return Sketch([left, right, *(np.array(ends) for ends in zip(left, right) if self.caps)], [])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -270,14 +261,6 @@ class Cylinder(Tapered):
         if self.outside and self.is_open:
             raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
         super().__post_init__()
-
-    @property
-    def height(self) -> float | None:
-        return self.length
-
-    @property
-    def has_caps(self) -> bool:
-        return self.caps
 
     @property
     def side(self) -> Solid:
@@ -356,10 +339,6 @@ class Cone(Tapered):
     @property
     def radii(self) -> tuple[float, float]:
         return self.radius, self.top_radius
-
-    @property
-    def height(self) -> float:
-        return self.length
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -147,6 +147,8 @@ class Wall:
 
     def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
         """Which points (N, 3) [m] lie on a side of it: "inside", also if None, "outside", or "behind" (N,)."""
+        if self.side.default == "behind":
+            return np.asarray(self.distance(points) < 0.0)
         inside = inside_surface(self.corners(), points)
         return ~inside if side == "outside" else inside
 
