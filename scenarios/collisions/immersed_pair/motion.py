@@ -83,7 +83,7 @@ def stage(
         settings=SolverSettings(
             free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
             skin=8.0 * setting.reduced_radius,
-            check_steps=False,
+            check_steps=False,  # the step is chosen here
             record=True,
         ),
     )
