@@ -134,7 +134,7 @@ class FilterKernel:
         self._homes = self._sides.homes
         _, ny, nx = self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
-        self._corners = np.array(corners, np.uint32)
+        self.corners = np.array(corners, np.uint32)
 
     def _diffusion(self, width: float) -> tuple[int, Array]:
         """Number of sweeps, and strength of each along x, y, z, that widen the mapping to a standard deviation."""
@@ -194,7 +194,7 @@ class FilterKernel:
             return self.gather(stencil, smoothed[0])
         values = np.empty((len(radius), len(smoothed[0])))
         loops.gather_of_kinds(
-            self.kinds(radius), *stencil, self._corners, self._layered(np.concatenate(smoothed)), values
+            self.kinds(radius), *stencil, self.corners, self.layered(np.concatenate(smoothed)), values
         )
         return values
 
@@ -282,7 +282,7 @@ class FilterKernel:
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
         slabs = places or (cell_map.order, cell_map.start)
-        loops.deposit(slabs, values, unit, *cell_map.stencil, self._corners, get_num_threads(), deposits)
+        loops.deposit(slabs, values, unit, *cell_map.stencil, self.corners, get_num_threads(), deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
@@ -299,19 +299,19 @@ class FilterKernel:
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         values = np.empty((len(stencil.first), len(fields)))
-        loops.gather(*stencil, self._corners, self._layered(fields), values)
+        loops.gather(*stencil, self.corners, self.layered(fields), values)
         return values
 
     def gather_with_slope(self, stencil: Stencil, field: Array) -> Array:
         """As `gather`, of one field (nz, ny, nx), and the derivatives of this value along x, y, z (N, 4)."""
         values = np.empty((len(stencil.first), 4))
-        loops.gather_with_slope(*stencil, self._corners, self._layered(field[None]), self._axes.inverse, values)
+        loops.gather_with_slope(*stencil, self.corners, self.layered(field[None]), self._axes.inverse, values)
         return values
 
     def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
         """As `gather`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
         values = np.empty((len(now.first), len(fields)))
-        loops.gather_over_steps(earlier, last, now, self._corners, self._layered(fields), values)
+        loops.gather_over_steps(earlier, last, now, self.corners, self.layered(fields), values)
         return values
 
     def between_centres(self, field: Array, position: Array) -> Array:
@@ -327,12 +327,20 @@ class FilterKernel:
         sample(around[None], AT_CENTRES, np.ascontiguousarray(position), origin, first, inverse, values)
         return np.asarray(values[:, 0])
 
-    def _layered(self, fields: Array) -> Array:
+    def layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
         fields = self._merged.averaged(fields)
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
+
+    def of_deposits(self, deposits: Array) -> Array:
+        """Fields (m, nz, ny, nx) of what lies on the cells, per open share of their groups."""
+        return self._merged.shared(deposits)
+
+    def of_large_cells(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) with the value of the large cell in all cells of a group."""
+        return self._merged.copied(fields)
 
     def smooth(self, fields: Array, stage: tuple[int, Array] | None = None) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint.

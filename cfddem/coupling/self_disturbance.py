@@ -31,9 +31,11 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import Own
 from cfddem.coupling.seen_solids import cells_of
+from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
 from cfddem.coupling.self_disturbance_walls import OwnSolids, WallsOfGrid, at_shares, shares_in_cell
 from cfddem.coupling.terms import CouplingTerms, total
+from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
@@ -64,10 +66,12 @@ class SelfDisturbance(FluidForce):
         grid, self.fluid = kernel.grid, fluid
         walls = fluid.boundaries if beside_walls else None
         self._kernel, kinds = kernel, range(len(kernel.stages))
-        self._in_cells = [OwnSolids(kernel, 2 if sharp else 1, walls, kind) for kind in kinds]
+        self._in_cells = [_own_solids(kernel, 2 if sharp else 1, walls, kind) for kind in kinds]
         cells = cells_of(kernel) if sharp else kernel
-        self._seen = [OwnSolids(cells, 1, walls, kind) for kind in kinds] if sharp else []
+        self._seen = [_own_solids(cells, 1, walls, kind) for kind in kinds] if sharp else []
         self._walls = [WallsOfGrid(kernel, fluid.boundaries, kind) for kind in kinds] if beside_walls else []
+        smooth = beside_walls and bool(grid.walls)
+        self._smooth = [WallsOfCells(kernel, kind) for kind in kinds] if smooth else []
         self._cell = np.array(grid.whole.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
         self._tables = [tables(kernel, kind) for kind in kinds]
 
@@ -80,6 +84,8 @@ class SelfDisturbance(FluidForce):
             position, volume = cell_map.position[rows], cell_map.volume[rows]
             if self._walls:
                 left[rows] *= self._walls[kind].left(position)
+            if self._smooth:
+                left[rows] = self._smooth[kind].left(position, left[rows])
             in_cells[rows] = self._in_cells[kind].of(position, volume)
             of_surfaces[rows] = self._seen[kind].of(position, volume) if self._seen else in_cells[rows]
         return Own(left, in_cells, of_surfaces)
@@ -113,8 +119,23 @@ class SelfDisturbance(FluidForce):
         numbers = np.arange(particles.count)
         pushed = Pushed(cell_map.position, drag, slip, screening, density, particles.viscosity, step)
         for kind, rows in self._kernel.of_each_kind(cell_map.radius):
-            left = self._walls[kind].left(cell_map.position[rows]) if self._walls else np.empty((0, 0, 3))
-            _build_up(numbers[rows], pushed, self._cell, self._tables[kind], left, particles.disturbance_modes)
+            position, modes = cell_map.position[rows], particles.disturbance_modes
+            left = self._walls[kind].left(position) if self._walls else np.empty((0, 0, 3))
+            build = numbers[rows], pushed, self._cell, self._tables[kind], left
+            _build_up(*build, modes)
+            if self._smooth:
+                grown = np.zeros_like(modes)
+                _build_up(*build, grown)
+                modes[rows] += self._smooth[kind].left(position, grown[rows]) - grown[rows]
+
+
+def _own_solids(
+    kernel: FilterKernel, passes: int, boundaries: Boundaries | None, kind: int
+) -> OwnSolids | SolidsOfCells:
+    """The solid fraction that particles gather of their own volume; see `OwnSolids`."""
+    if boundaries and kernel.grid.walls:
+        return SolidsOfCells(kernel, passes, kind)
+    return OwnSolids(kernel, passes, boundaries, kind)
 
 
 class Pushed(NamedTuple):

@@ -50,7 +50,7 @@ class _Side(NamedTuple):
 
 
 class WallsOfGrid:
-    """Sides of the grid that stop the self-disturbance: all but periodic sides and outlets.
+    """Sides of the grid that stop the self-disturbance: all but periodic and closed sides, and outlets.
 
     kernel      of the run; the tables are found once for each grid
     boundaries  of the fluid
@@ -101,7 +101,8 @@ def _sides(kernel: FilterKernel, boundaries: Boundaries) -> Iterator[_Side]:
     """The sides that stop the self-disturbance, among the cells of a kernel."""
     grid = kernel.grid.whole
     for side in boundaries.box.sides:
-        if grid.cells[side.axis] > 1 and not side.outlet.any():  # local: every rank has the whole box
+        is_open = np.any(boundaries.box.open_share(side) > 0.0)  # local: every rank has the whole box
+        if is_open and grid.cells[side.axis] > 1 and not side.outlet.any():  # local: likewise
             slips = bool((side.mirror > 0.0).all())  # local: likewise
             place = grid.origin[side.axis] + (grid.size[side.axis] if side.high else 0.0)
             yield _Side(side.axis, place, side.inward / grid.spacing[side.axis], slips)

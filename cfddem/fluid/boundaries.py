@@ -154,6 +154,13 @@ class Boundaries:
         x, y, z = (np.array(side.layer(c, index)) for c in coordinates)
         return x, y, z
 
+    def open_share(self, side: Side) -> Any:
+        """Share of the faces of a side that smooth walls leave open, over its plane without ghosts."""
+        if not self.grid.walls:
+            return 1.0
+        faces: Any = self.grid.inner_faces(self.cut.of_faces(side.axis), side.axis)  # type: ignore[arg-type]
+        return side.layer(faces, -1 if side.high else 0)
+
     # ------------------------------------------------------------ every step
 
     def set_inlets(self, time: float, voidage: Array) -> None:

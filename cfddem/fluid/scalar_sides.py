@@ -44,7 +44,7 @@ class SideFaces(NamedTuple):
             inlet, outlet = np.isin(side.owner, side.inlets), side.outlet[LOW:, LOW:][: own.shape[0], : own.shape[1]]
             rule = np.zeros((*own.shape, 6))
             rule[:] = rule_of(sides.walls.get(side.name, FluxWall()), capacity)
-            rule[..., 4] *= _open_share(boundaries, side)
+            rule[..., 4] *= boundaries.open_share(side)
             rule[inlet] = 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
             rule[inlet, 0] = _brought(grid, side, inlet, sides)
             rule[outlet] = math.nan if sides.backflow is None else sides.backflow, 0.0, 0.0, 0.0, 1.0, 0.0
@@ -67,15 +67,6 @@ def _brought(grid: Grid, side: Side, inlet: np.ndarray, sides: ScalarSides) -> A
         return sides.inflow
     at = np.broadcast_arrays(*grid.faces(side.axis))
     return sides.inflow(side.name, *(side.layer(coordinate, -1 if side.high else 0)[inlet] for coordinate in at))
-
-
-def _open_share(boundaries: Boundaries, side: Side) -> Any:
-    """Share of the faces of a side that smooth walls leave open, over its plane without ghosts."""
-    grid, cut = boundaries.grid, boundaries.cut
-    if not grid.walls:
-        return 1.0
-    faces: Any = grid.inner_faces(cut.of_faces(side.axis), side.axis)  # type: ignore[arg-type]
-    return side.layer(faces, -1 if side.high else 0)
 
 
 def rule_of(wall: Wall, capacity: float) -> np.ndarray:

@@ -12,6 +12,8 @@ from test_coupling_ranks import advanced, assert_same_bits, begun, case_of
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
+from cfddem.coupling.self_disturbance_tables import MODES
 from cfddem.features.heat import HeatExchange
 from cfddem.fluid.block import Block, divide, owners
 from cfddem.fluid.cell_groups import Groups
@@ -44,7 +46,8 @@ WALLS: dict[str, tuple[Surface, bool]] = {
 
 
 def gathered(name: str, shape: tuple[int, int, int] | None, communicator: Communicator = SERIAL) -> list[Array]:
-    """What 2 000 particles deposit in the cells, and what they gather of it, in the order of all particles."""
+    """What 2 000 particles deposit in the cells, what they gather of it, and what walls leave of their own flow and
+    solids, in the order of all particles."""
     walls, repeats = WALLS[name]
     grid, draw = within(BOX, walls), np.random.default_rng(1)
     away, turn = 0.4 * np.sqrt(draw.uniform(0.0, 1.0, 2000)), draw.uniform(0.0, 2.0 * np.pi, 2000)
@@ -63,6 +66,8 @@ def gathered(name: str, shape: tuple[int, int, int] | None, communicator: Commun
     seen = [
         kernel.sample(cell_map.stencil, cell_map.radius, cells.part(field)),
         kernel.solids_with_slope(cell_map),
+        WallsOfCells(kernel).left(places[mine], np.ones((len(mine), MODES, 3))),
+        SolidsOfCells(FilterKernel(cells, kernel.periodic, owners=domain), 1).of(places[mine], radius[mine]),
     ]  # fmt: skip
     return [cells.joined(kernel.solid_fraction(cell_map)), *(communicator.joined(each)[order] for each in seen)]
 

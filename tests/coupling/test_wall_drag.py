@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from cfddem.backend.errors import InputError
 from cfddem.coupling.forces.wall_drag import CLOSEST, WallDrag
-from cfddem.coupling.self_disturbance_tables import tables_of
-from cfddem.coupling.self_disturbance_walls import PLACES, flow_beside, solid_beside
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
+from cfddem.coupling.self_disturbance_tables import MODES, tables_of
+from cfddem.coupling.self_disturbance_walls import FARTHEST, PLACES, OwnSolids, flow_beside, solid_beside
+from cfddem.fluid.cut_cells import within
+from cfddem.fluid.grid import Grid
+from cfddem.fluid.surfaces import Plane as SmoothPlane
+from cfddem.fluid.surfaces import cylinder
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from cfddem.run.simulation import Simulation
@@ -198,6 +205,89 @@ def test_shares_of_the_self_disturbance_beside_a_wall(slips: bool) -> None:
         left = float((whole * shares[row, :, d]).sum() / whole.sum())
         assert left == pytest.approx(1.0 - lost / (6.0 * math.pi * away * whole.sum()), abs=0.04)
     assert solid_beside(2, (cell,) * 3, strength, sweeps)[row] == pytest.approx(1.0, abs=1e-6)
+
+
+def left_by(*normal: float) -> np.ndarray:
+    """What a smooth plane leaves of flows along its normal and along it (2, 3, MODES): in the cell at the wall, in the
+    next one along the normal, and in the seventh from it."""
+    point, unit = (0.8, 0.8, 0.0), np.array(normal) / np.linalg.norm(normal)
+    grid = within(Grid((20, 20, 4), (0.1,) * 3), SmoothPlane(point, normal))  # type: ignore[arg-type]
+    kernel = FilterKernel(grid, (True,) * 3, smoothing=0.15)
+    places = np.array([0.85, 0.85, 0.25]) + np.outer([0.0, 0.1, 0.7], normal)
+    walls, left = WallsOfCells(kernel), []
+    for direction in (unit, np.array([-unit[1], unit[0], 0.0])):
+        flow = walls.left(places, np.tile(direction, (3, MODES, 1)))
+        left.append(flow @ direction)
+        assert flow == pytest.approx(left[-1][:, :, None] * direction, abs=1e-6)
+    return np.array(left)
+
+
+def test_cells_beside_a_smooth_wall_leave_what_a_side_leaves_at_their_distance() -> None:
+    """Straight, and in the frame of a slanting wall."""
+    kernel = FilterKernel(Grid((8, 8, 4), (0.1,) * 3), (False,) * 3, smoothing=0.15)
+    shares = flow_beside(0, False, kernel.grid.spacing, tuple(kernel.stages[0][1]), kernel.stages[0][0])
+    straight, slanting = left_by(1.0, 0.0, 0.0), left_by(1.0, 1.0, 0.0)
+    for direction in range(2):
+        beside = np.sqrt(np.maximum(shares[:, :, direction], 1e-12))
+        assert straight[direction, :2] == pytest.approx(beside[2:7:PLACES], rel=1e-6)
+        assert straight[direction, 2] == pytest.approx(beside[-3] ** ((FARTHEST - 0.5) / 7.5), rel=1e-6)
+    # at 0.71, 2.1 and 10.6 cells, long waves
+    longest = np.s_[:, :, :2]
+    assert (straight[longest] < slanting[longest]).all() and (slanting[:, 0, :2] < straight[:, 1, :2]).all()
+
+
+@pytest.mark.parametrize(("smoothing", "within_share"), [(0.0, 1e-9), (0.08, 0.01)])
+def test_solids_that_a_sphere_gathers_of_its_own_beside_a_round_wall(smoothing: float, within_share: float) -> None:
+    """Against the deposit of each alone; the control has no walls, and misses up to half of it."""
+    grid = within(Grid((13, 13, 10), (0.1,) * 3), cylinder((0.631, 0.617, 0.0), 0.55))
+    kernel = FilterKernel(grid, (False, False, True), smoothing=smoothing)
+    draw = np.random.default_rng(1)
+    away, turn = 0.55 - draw.uniform(0.015, 0.15, 40), draw.uniform(0.0, 2.0 * math.pi, 40)
+    places = np.stack([0.631 + away * np.cos(turn), 0.617 + away * np.sin(turn), draw.uniform(0.0, 1.0, 40)], axis=1)
+    radius = np.full(40, 0.01)
+    maps = [kernel.map_particles(place[None], radius[:1]) for place in places]
+    alone = [kernel.gather(each.stencil, kernel.solid_fraction(each)[None])[0, 0] for each in maps]
+    volume = 4.0 / 3.0 * math.pi * radius**3
+    error = np.abs(SolidsOfCells(kernel, 1).of(places, volume) / alone - 1.0)
+    without = np.abs(OwnSolids(kernel, 1, None).of(places, volume) / alone - 1.0)
+    print(f"largest error {error.max():.3g}, without walls {without.max():.3g}")
+    assert error.max() < within_share < without.max()
+
+
+@pytest.mark.slow
+def test_a_coupled_sphere_moves_to_a_round_wall_as_the_law_says() -> None:
+    """In a cylinder of 12 cells of 4 diameters across, at Re = 0.02, between the axes of the grid: within 2 % of the
+    terminal velocity. Counted twice, the drag would slow it by up to 15 %."""
+    density, viscosity, edge, radius = 970.0, 3.73, 8.0 * RADIUS_OF_NYLON, RADIUS_OF_NYLON
+    middle, towards = 6.0 * edge, np.array([math.cos(0.6), math.sin(0.6), 0.0])
+    place = np.array([middle, middle, 6.3 * edge]) + (6.0 * edge - 7.0 * radius) * towards
+    case = settling.ten_cate(density, viscosity).with_(**{
+        "material.nylon.youngs_modulus": 1e6, "column.width": 12.0 * edge, "column.height": 12.0 * edge,
+        "column.sides": "no_slip", "vessel": {"shape": "cylinder"}, "bed.positions": [tuple(place.tolist())],
+        "laws.wall_drag": "nearest", "laws.gravity": tuple((9.81 * towards).tolist()), "run.fluid_step": 0.05,
+        "run.until": 200.0,
+    })  # fmt: skip
+    weight = 4.0 / 3.0 * math.pi * radius**3 * (1120.0 - density) * 9.81
+
+    def speed(factor: float) -> float:
+        """Of the drag of Abraham and the part of a wall that balance the weight [m/s]."""
+
+        def missing(v: float) -> float:
+            reynolds = 2.0 * radius * density * v / viscosity
+            drag = 0.5 * density * v**2 * math.pi * radius**2 * 24.0 / 9.06**2 * (1.0 + 9.06 / math.sqrt(reynolds)) ** 2
+            return drag + 6.0 * math.pi * viscosity * radius * v * factor - weight
+
+        return float(brentq(missing, 1e-8, 1.0))
+
+    simulation, found = Simulation(case), []
+    while not found or found[-1][0] > 0.3:
+        simulation.step()
+        particle = simulation.particles.position[0], simulation.particles.velocity[0]
+        gap = (6.0 * edge - math.hypot(*(particle[0][:2] - middle))) / radius - 1.0
+        found.append((gap, float(particle[1] @ towards)))
+    errors = [(v - speed(1.0 / gap + towards_wall(gap) - 1.0)) / speed(0.0) for gap, v in found if gap < 4.0]
+    print(f"errors from {min(errors):+.4f} to {max(errors):+.4f} of the terminal velocity")
+    assert len(errors) > 50 and max(np.abs(errors)) < 0.02
 
 
 @pytest.mark.slow

@@ -1,0 +1,176 @@
+r"""What smooth walls, which cut cells, leave of the self-disturbance.
+
+The flow of a particle is driven in the cells on which it deposits, and gathered from these. Beside a cut wall they may
+lie at another distance from it than the particle: small cells are taken together with a larger one. So the shares are
+those of cells. A cell has the root of what a plane wall at the mean distance of its open part leaves of each mode,
+towards the wall and along it, and the normal of the wall. A particle gathers them as it gathers the fluid:
+
+.. math:: u_k \to \left[r_t + (r_n - r_t)\,nn\right]\cdot u_k
+
+Between tabulated distances d the logarithm of a share, times d, is linear: the effect of a wall falls as 1/d. Nearer
+than half a cell a share falls as d. What a curved wall does beyond a plane one is left to the grid.
+
+The solid fraction that a particle gathers of its own is a sum over pairs of its cells. What each cell gathers of itself
+and of its neighbours is found with the kernel of the run, between all walls, once.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from cfddem.backend.compile import inline, prange, threaded
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.self_disturbance_tables import MODES, lattice_of
+from cfddem.coupling.self_disturbance_walls import PLACES, flow_beside
+from cfddem.fluid.cut_cells import contents
+from cfddem.fluid.grid import Array
+from cfddem.fluid.surfaces import Surface
+
+LEAST = 1e-12
+"""Smallest share of a mode that counts [-]."""
+
+APART = 6
+"""Distance in cells at which a cell no longer gathers from another one, at most."""
+
+NEIGHBOURS = tuple(product((-1, 0, 1), repeat=3))
+"""Steps along z, y, x from a cell to itself and its neighbours."""
+
+
+class WallsOfCells:
+    """What the smooth walls of a grid leave of flows that particles drive.
+
+    kernel  of the run, on a grid with smooth walls
+    kind    of the kernel
+    """
+
+    def __init__(self, kernel: FilterKernel, kind: int = 0) -> None:
+        whole, lattice = kernel.grid.whole, lattice_of(kernel, kind)
+        centres = [np.ravel(coordinate) for coordinate in np.broadcast_arrays(*whole.centres())]
+        distance = np.maximum(contents(whole.walls, whole.spacing, *centres)[1], 0.0)
+        normal = _normals(whole.walls, centres, min(whole.spacing))
+        towards, along = np.zeros((2, MODES, distance.size))
+        for axis in range(3):
+            if whole.cells[axis] == 1:
+                continue
+            roots = _roots(distance / whole.spacing[axis], flow_beside(axis, False, *lattice))
+            weight = normal[axis] ** 2
+            towards += weight * roots[:, axis]
+            along += weight * 0.5 * (roots.sum(axis=1) - roots[:, axis])  # local: three components
+        fields = np.concatenate([towards, along, normal]).reshape(-1, *whole.shape)
+        self._kernel, self._fields = kernel, np.ascontiguousarray(kernel.grid.part(fields))
+
+    def left(self, position: Array, flow: Array) -> Array:
+        """The modes of flows (N, MODES, 3) that particles at these places (N, 3) [m] drive or gather, beside walls."""
+        kernel = self._kernel
+        values = kernel.gather(kernel.stencil(position, np.zeros(len(position))), self._fields)
+        towards, along, normal = values[:, :MODES], values[:, MODES : 2 * MODES], values[:, 2 * MODES :]
+        x, y, z = normal.T
+        normal = normal / np.sqrt(np.maximum(x * x + y * y + z * z, LEAST))[:, None]
+        through = sum(flow[:, :, d] * normal[:, None, d] for d in range(3))
+        left: Array = along[:, :, None] * flow + ((towards - along) * through)[:, :, None] * normal[:, None, :]
+        return left
+
+
+class SolidsOfCells:
+    """The solid fraction that particles gather of their own volume, on a grid with smooth walls.
+
+    kernel  of the run
+    passes  how often the gathered volume has passed the second stage of the kernel: 1 or 2
+    kind    of the kernel
+    """
+
+    def __init__(self, kernel: FilterKernel, passes: int, kind: int = 0) -> None:
+        numbers = np.indices(kernel.grid.whole.shape, dtype=float)[::-1]  # along x, y, z
+        place = kernel.of_large_cells(kernel.grid.part(numbers))
+        exchanged = kernel.of_large_cells(_exchanged(kernel, passes, kind))
+        self._kernel, self._fields = kernel, np.concatenate([place, exchanged])
+
+    def of(self, position: Array, volume: Array) -> Array:
+        """Of particles at these places (N, 3) [m] with these volumes (N,) [m3]; (N,) [-]."""
+        kernel, own = self._kernel, np.empty(len(volume))
+        stencil = kernel.stencil(position, np.zeros(len(position)))
+        _pairs(stencil, kernel.corners, kernel.layered(self._fields), volume / kernel.grid.cell_volume, own)
+        return own
+
+
+def _normals(surface: Surface, centres: list[Array], spacing: float) -> Array:
+    """Normals of the wall, into the fluid, at points x, y, z of one shape (3, n)."""
+    slope = np.empty((3, centres[0].size))
+    for d in range(3):
+        step = [1e-3 * spacing * (d == e) for e in range(3)]
+        high, low = (surface.distance(*(c + side * s for c, s in zip(centres, step))) for side in (1.0, -1.0))
+        slope[d] = high - low
+    x, y, z = slope
+    normal: Array = slope / np.sqrt(np.maximum(x * x + y * y + z * z, 1e-300))
+    return normal
+
+
+def _roots(distance: Array, shares: Array) -> Array:
+    """Roots of the shares that a wall leaves at distances in cells (n,), of `flow_beside`; (MODES, 3, n)."""
+    shares = np.maximum(shares[PLACES // 2 :: PLACES], LEAST)  # at the centres of cells
+    at = np.arange(len(shares)) + 0.5
+    strength = -np.log(shares) * at[:, None, None]
+    away = np.maximum(distance, at[0])
+    row = np.clip((away - at[0]).astype(int), 0, len(at) - 2)
+    part = np.minimum(away - at[row], 1.0)[:, None, None]
+    lost = (strength[row] + part * (strength[row + 1] - strength[row])) / away[:, None, None]
+    roots = np.exp(-0.5 * lost) * np.sqrt(np.minimum(distance / at[0], 1.0))[:, None, None]
+    return np.moveaxis(roots, 0, -1)
+
+
+def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
+    """What every cell gathers of a unit that is deposited on each of `NEIGHBOURS` (27, nz, ny, nx) [-].
+
+    Cells that are too far apart to gather from each other are found together.
+    """
+    whole, (sweeps, _) = kernel.grid.whole, kernel.stages[kind]
+    apart, turns = min(passes * sweeps, APART) + 2, []
+    for count, periodic in zip(whole.shape, kernel.periodic[::-1]):
+        number, rest = np.arange(count), count % apart if periodic else 0
+        turns.append(np.where(number < count - rest, number % apart, number - count + rest + apart))
+    z, y, x = np.ix_(*turns)
+    exchanged = np.zeros((len(NEIGHBOURS), *kernel.grid.shape))
+    for c, b, a in product(*(np.unique(number) for number in turns)):
+        chosen = (z == c) & (y == b) & (x == a)
+        fields = kernel.of_deposits(kernel.grid.part(chosen).astype(float)[None])
+        for _ in range(passes if sweeps else 0):
+            fields = kernel.smooth(fields, kernel.stages[kind])
+        for values, steps in zip(exchanged, NEIGHBOURS):
+            values += kernel.grid.part(np.roll(chosen, [-step for step in steps], axis=(0, 1, 2))) * fields[0]
+    return exchanged
+
+
+@inline
+def _weight(corner, a, b, c):
+    """Of one of the eight cells on which a particle deposits, counted along x first."""
+    x, y, z = corner & 1, corner >> 1 & 1, corner >> 2
+    return (a if x else 1.0 - a) * (b if y else 1.0 - b) * (c if z else 1.0 - c)
+
+
+@inline
+def _step(here, there):
+    """From a number of cells to another one: -1, 0 or 1; over a periodic side the other way round."""
+    apart = there - here
+    step = 1 if apart > 0.5 else (-1 if apart < -0.5 else 0)
+    return step if abs(apart) < 3.5 else -step
+
+
+@threaded
+def _pairs(stencil, corners, around, volume, own):
+    """Sum over pairs of the cells of each particle.
+
+    around  of cells: number along x, y, z of the large cell, and what it gathers of `NEIGHBOURS` (cells, 3 + 27)
+    volume  over that of a cell (N,)
+    """
+    for n in prange(len(volume)):
+        total, first = 0.0, stencil.first[n, 0]
+        a, b, c = stencil.shares[n, 0, 0], stencil.shares[n, 0, 1], stencil.shares[n, 0, 2]
+        for i in range(8):
+            here = around[first + corners[i]]
+            for j in range(8):
+                there = around[first + corners[j]]
+                x, y, z = _step(here[0], there[0]), _step(here[1], there[1]), _step(here[2], there[2])
+                total += _weight(i, a, b, c) * _weight(j, a, b, c) * here[3 + 9 * (z + 1) + 3 * (y + 1) + x + 1]
+        own[n] = volume[n] * total
