@@ -140,9 +140,9 @@ class Coupling:
         particles.viscosity[:] = self.kernel.between_centres(self.fluid.viscosity, particles.position)
         terms = self._terms(particles, cell_map, step)
         self.forces.act(terms)
-        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen)
-        if terms.on_fluid:
-            terms.source = self._source(cell_map, total(terms.on_fluid, terms.unseen))
+        unseen = terms.unseen
+        on_fluid = total(terms.on_fluid, unseen) if terms.on_fluid else None
+        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, unseen, on_fluid)
         return terms
 
     def apply(self, particles: Particles, terms: CouplingTerms) -> None:
@@ -181,12 +181,12 @@ class Coupling:
 
     def _terms(self, particles: Particles, cell_map: ParticleCellMap, step: float) -> CouplingTerms:
         """Terms of a step with the flow around every particle, before any force has acted."""
-        solid = self.kernel.solid_fraction(cell_map)
+        solid, carried = self.flow.deposited(particles, cell_map)
         terms = CouplingTerms(particles, step, self.momentum.last_step, cell_map, solid)
         # forces act over the step: they see the mean of the solid fractions at its beginning and its end
         first = self.momentum.last_step == 0.0
         mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
-        terms.flow = self.flow.sample(particles, cell_map, solid, mean)
+        terms.flow = self.flow.sample(particles, cell_map, solid, mean, carried)
         terms.seen_solids = self.flow.seen_solids
         return terms
 
@@ -229,11 +229,6 @@ class Coupling:
         displaced = self.fluid.density * particles.volume * particles.inverse_mass
         largest = STABLE * (2.0 - drag) / np.maximum(crowding * (2.0 * drag + 4.0 * displaced), 1e-12)
         return np.asarray(np.minimum(1.0 / (1.0 + response**2), largest))
-
-    def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
-        """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
-        source = self.kernel.spread(cell_map, force) / self.fluid.grid.cell_volume
-        return np.ascontiguousarray(np.moveaxis(source, 0, -1))
 
 
 class Uncoupled:

@@ -73,9 +73,9 @@ class ParticleCellMap(NamedTuple):
     of_kinds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # order and start of each kind of kernel, if unequal
 
 
-def _over(fields: Array, volume: float) -> Array:
-    """Fields per volume [m3]."""
-    return fields if volume == 1.0 else fields / volume
+def _over(fields: Array, volume: Array | float) -> Array:
+    """Fields per volume [m3], one for all or one of each."""
+    return fields if np.ndim(volume) == 0 and volume == 1.0 else fields / np.reshape(volume, (-1, 1, 1, 1))
 
 
 class FilterKernel:
@@ -117,7 +117,7 @@ class FilterKernel:
         self.owners, self._parts = owners or SingleDomain(), parts
         self._take_reach()
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
-        self._buffers: dict[int, Array] = {}
+        self._buffers: dict[int, list[tuple[Array, Array]]] = {}
         self._gates = self._merged.gates(self.halo)
         self.sizes = tuple(sizes)
         radii = np.array([radius for radius, _ in self.sizes])
@@ -171,10 +171,10 @@ class FilterKernel:
         for kind in range(len(self.stages)):
             yield kind, np.flatnonzero(kinds == kind)  # none too: all ranks pass the second stage together
 
-    def spread(self, cell_map: ParticleCellMap, values: Array, volume: float = 1.0) -> Array:
+    def spread(self, cell_map: ParticleCellMap, values: Array, volume: Array | float = 1.0) -> Array:
         """Both stages: sum over particles of weight times value, values (N, m) to fields (m, nz, ny, nx).
 
-        volume  by which deposits are divided before the second stage [m3]
+        volume  by which deposits are divided before the second stage, one or of each of the values [m3]
         """
         if not self.unequal:
             return self.smooth(_over(self.deposit(cell_map, values), volume))
@@ -351,21 +351,21 @@ class FilterKernel:
         fields = self._merged.averaged(fields)
         if sweeps == 0:
             return np.array(fields, float)
-        now, other = self._scratch(len(fields))
-        self.halo.inner(now)[:] = fields
+        (now, inside), (other, inside_other) = self._scratch(len(fields))
+        inside[:] = fields
         for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
             loops.sweep(now, other, strength, *self._gates)
-            self._merged.relax(self.halo.inner(now), self.halo.inner(other))
-            now, other = other, now
-        return self._merged.copied(self.halo.inner(now).copy())
+            self._merged.relax(inside, inside_other)
+            now, inside, other, inside_other = other, inside_other, now, inside
+        return self._merged.copied(inside.copy())
 
-    def _scratch(self, count: int) -> tuple[Array, Array]:
-        """Two arrays for so many padded fields, the same in every call."""
+    def _scratch(self, count: int) -> list[tuple[Array, Array]]:
+        """Two arrays for so many padded fields, each with a view without its ghosts; the same in every call."""
         if count not in self._buffers:
-            shape = 2, count, *(n + 2 for n in self.grid.shape)
-            self._buffers[count] = np.zeros(shape)
-        return self._buffers[count][0], self._buffers[count][1]
+            padded = np.zeros((2, count, *(n + 2 for n in self.grid.shape)))
+            self._buffers[count] = [(fields, self.halo.inner(fields)) for fields in padded]
+        return self._buffers[count]
 
     def solid_fraction(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction of the cells (nz, ny, nx) [-]."""

@@ -97,13 +97,23 @@ class FlowSampler:
         own = next((force.own for force in needs if force.own is not None), nothing_of_its_own)
         return cls(fluid, kernel, own, any(force.needs_sizes for force in needs))
 
+    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array | None]:
+        """Solid fraction of the cells (nz, ny, nx), and what `sample` needs of the cells beside."""
+        return self.kernel.solid_fraction(cell_map), None
+
     def sample(
-        self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None
+        self,
+        particles: Particles,
+        cell_map: ParticleCellMap,
+        solid: Array,
+        mean: Array | None = None,
+        carried: Array | None = None,
     ) -> SampledFlow:
         """The flow around every particle now.
 
-        solid  solid fraction of the cells, of the positions in `cell_map` (nz, ny, nx)
-        mean   the same in the middle of the step, which particles see; `solid` if None
+        solid    solid fraction of the cells, of the positions in `cell_map` (nz, ny, nx)
+        mean     the same in the middle of the step, which particles see; `solid` if None
+        carried  as `deposited` returns it; deposited here if None
         """
         gathered = self._gathered(cell_map, solid if mean is None else mean)
         if self.kernel.unequal:
@@ -241,13 +251,29 @@ class SharpFlowSampler(FlowSampler):
         super().__init__(fluid, kernel, own, sizes)
         self.seen_solids = SeenSolids(kernel)
 
+    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
+        """Solid fraction of the cells, and solid fraction times velocity of the particles (3, nz, ny, nx) [m/s]."""
+        kernel, volume = self.kernel, cell_map.volume[:, None]
+        cell = kernel.grid.cell_volume
+        fields = kernel.spread(
+            cell_map, np.hstack([volume, volume * particles.velocity]), np.array([1.0, cell, cell, cell])
+        )
+        return fields[0] / cell, fields[1:]
+
     def sample(
-        self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None
+        self,
+        particles: Particles,
+        cell_map: ParticleCellMap,
+        solid: Array,
+        mean: Array | None = None,
+        carried: Array | None = None,
     ) -> SampledFlow:
         """See `FlowSampler.sample`."""
         assert self.seen_solids is not None
+        if carried is None:
+            _, carried = self.deposited(particles, cell_map)
         solids = _Solids(self.seen_solids.around(cell_map), self.seen_solids.change, particles[SEEN.name])
-        gathered = self._means(particles, cell_map, solid if mean is None else mean)
+        gathered = self._means(cell_map, solid if mean is None else mean, carried)
         own = self.own(particles, cell_map)
         (slip, unseen), ratio = np.empty((2, particles.count, 3)), self._diameter_ratio(particles, cell_map, solid)
         voidage, reynolds, others, narrowing, of_others, company = np.empty((6, particles.count))
@@ -260,14 +286,12 @@ class SharpFlowSampler(FlowSampler):
         """Store the solid fraction seen at the end of the step."""
         particles[SEEN.name][:] = flow.solid
 
-    def _means(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
+    def _means(self, cell_map: ParticleCellMap, solid: Array, carried: Array) -> Array:
         """Means of the cells around every particle: velocity of the fluid, solid fraction, solid fraction times
         velocity of the fluid, and of the particles (N, 10) [m/s], [-], [m/s], [m/s]."""
-        kernel, velocity = self.kernel, np.moveaxis(self.fluid.velocity, -1, 0)
-        momentum = cell_map.volume[:, None] * particles.velocity
-        carried = kernel.spread(cell_map, momentum, kernel.grid.cell_volume)
+        velocity = np.moveaxis(self.fluid.velocity, -1, 0)
         fields = np.concatenate([velocity, solid[None], solid * velocity, carried])
-        return kernel.sample(cell_map.stencil, cell_map.radius, fields)
+        return self.kernel.sample(cell_map.stencil, cell_map.radius, fields)
 
 
 class _Spheres(NamedTuple):

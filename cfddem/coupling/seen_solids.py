@@ -75,7 +75,8 @@ class SeenSolids:
             self._map, self._weights, self.change = cell_map, cell_map.volume, np.zeros((len(cell_map.volume), 3))
             self._sums = self._summed(cell_map.volume[:, None])[:, 0]
             return cells.gather(cell_map.stencil, cells.solid_fraction(cell_map)[None])[:, 0]
-        self._map = cells.map_particles(cell_map.position, cell_map.radius)
+        # the slabs of the cells of the fluid are slabs of their parts, too
+        self._map = cell_map._replace(stencil=cells.stencil(cell_map.position, cell_map.radius))
         gathered = cells.solids_with_slope(self._map)
         weighted, self.change = np.empty((len(gathered), 2)), np.empty((len(gathered), 3))
         _weigh(gathered, cell_map.volume, cells.width(cell_map.radius) / SHARPNESS, weighted, self.change)

@@ -134,7 +134,6 @@ class CouplingTerms(ForceTerms):
 
     implicit: ImplicitCoefficients
     seen_solids: SeenSolids | None = None  # means that particles see, where surfaces are sharp
-    source: Array | None = None  # explicit force on the fluid (nz, ny, nx, 3) [N/m3]
 
     def __init__(
         self, particles: Particles, step: float, last_step: float, cell_map: ParticleCellMap, solid: Array
@@ -145,7 +144,8 @@ class CouplingTerms(ForceTerms):
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
         """Arguments of `FluidSolver.step` after the length of the step."""
-        return 1.0 - self.solid, self.implicit.cell_conductance, self.implicit.cell_product, self.source
+        sent = self.implicit
+        return 1.0 - self.solid, sent.cell_conductance, sent.cell_product, sent.cell_source
 
 
 def inertia(particles: Particles) -> Array:

@@ -54,6 +54,7 @@ class ImplicitCoefficients(NamedTuple):
     target: Array  # v* (N, m)
     cell_conductance: Array  # sum of b* per volume (nz, ny, nx)
     cell_product: Array  # sum of b* v* likewise (nz, ny, nx, m)
+    cell_source: Array | None = None  # sum of what is given beside, likewise (nz, ny, nx, k)
 
 
 @dataclass
@@ -96,19 +97,25 @@ class Transfer:
         conductance: Array,
         step: float,
         disturbance: Array | None = None,
+        source: Array | None = None,
     ) -> ImplicitCoefficients:
         """Coefficients of the coming step [s].
 
         conductance  b (N,)
         disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
+        source       what every particle gives to the fluid beside (N, k); nothing if None
         """
         kernel, value = self.kernel, _columns(particles[self.value])
         disturbance = _or_zero(disturbance, value)
         implicit, target, carried = implicit_coefficients(
             conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step
         )
+        if source is not None:
+            carried = np.concatenate([carried, source], axis=1)
         cells = kernel.spread(cell_map, carried) / kernel.grid.cell_volume
-        return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
+        product, beside = (np.moveaxis(part, 0, -1) for part in np.split(cells[1:], [value.shape[1]]))
+        cell_source = None if source is None else np.ascontiguousarray(beside)
+        return ImplicitCoefficients(step, conductance, implicit, target, cells[0], product, cell_source)
 
     def apply(
         self, particles: Particles, cell_map: ParticleCellMap, sent: ImplicitCoefficients, weight: Array, value: Array

@@ -123,7 +123,7 @@ def test_momentum_is_conserved(law: str, surface: str) -> None:
     assert np.abs(end - start).max() < 1e-3 * passed  # the last force of the step has not acted yet
     owed = particles.drag_momentum.sum(axis=0) / 1e-4 if surface == "sharp" else 0.0  # by drag in the last step
     terms = simulation.coupling.prepare(particles, 1e-4)
-    given = terms.source.sum(axis=(0, 1, 2)) * fluid.grid.cell_volume + owed
+    given = terms.implicit.cell_source.sum(axis=(0, 1, 2)) * fluid.grid.cell_volume + owed
     force = sum(terms.force(line) for line in terms.on_fluid)
     assert np.abs(given + force.sum(axis=0)).max() < 1e-12 * np.abs(force).sum()
 

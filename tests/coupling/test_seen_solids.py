@@ -202,3 +202,17 @@ def test_a_lone_sphere_sees_only_itself() -> None:
         assert own.of(cell_map.position, cell_map.volume) == pytest.approx(
             seen.around(cell_map), rel=0.06 if height < 2e-3 else 5e-3
         )
+
+
+@pytest.mark.parametrize("mapping", ["linear", "divided"])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_slabs_of_cells_are_slabs_of_their_parts(mapping: str, periodic: bool) -> None:
+    """Threads fill slabs of even number together, then those of odd number: no two of these deposit on one part."""
+    kernel = FilterKernel(Grid((4, 4, 24), (3.0,) * 3), (periodic,) * 3, mapping=mapping, smoothing=1.0)
+    cells, radius = cells_of(kernel), np.full(3000, 0.5)
+    cell_map = kernel.map_particles(np.random.default_rng(1).uniform(0.0, (12.0, 12.0, 72.0), (3000, 3)), radius)
+    _, ny, nx = cells.reach.shape
+    layers = cells.stencil(cell_map.position, radius).first[:, 0] // ((ny + 2) * (nx + 2))
+    bounds = [layers[cell_map.order[begin:end]] for begin, end in zip(cell_map.start[:-1], cell_map.start[1:])]
+    assert len(bounds) == 6 or mapping == "divided"
+    assert all(lower.max() + 1 < upper.min() for lower, upper in zip(bounds, bounds[2:]))

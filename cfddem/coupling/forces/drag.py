@@ -77,17 +77,16 @@ class Drag(FluidForce):
         """Put the pressure of the drag that a particle sees in the place of that of the drag in the cells around."""
         if self._kernel is None:
             return
-        kernel, flow, volume = self._kernel, terms.flow, terms.cell_map.volume[:, None]
-        slip = terms.implicit_force["drag"] / np.maximum(terms.conductance("drag"), 1e-300)[:, None]
-        if "drag" in terms.fluctuations:
-            slip = slip - terms.fluctuations["drag"]
-        drag = self._alone[:, None] * slip
+        kernel, flow, volume, force = self._kernel, terms.flow, terms.cell_map.volume, terms.implicit_force["drag"]
+        fluctuation = terms.fluctuations.get("drag", np.empty((0, 3)))
+        drag, over_volume, rest = np.empty((3, *force.shape))
+        _drag_alone(force, terms.conductance("drag"), fluctuation, self._alone, volume, drag, over_volume)
         density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
         in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
-        in_solids = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen_solids.averaged(drag / volume)
-        rest = volume * (in_solids - flow.company[:, None] * in_cells)
+        in_solids = terms.seen_solids.averaged(over_volume)
+        _seen_less_that_of_cells(in_solids, in_cells, flow.voidage, flow.company, volume, rest)
         terms.push("drag", rest)
-        terms.particles[OWED.name][:] = terms.step * rest
+        np.multiply(rest, terms.step, out=terms.particles[OWED.name])
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
@@ -110,6 +109,38 @@ class Drag(FluidForce):
             n = int(np.argmax(wrong))  # local: the first on this rank
             at = f"it is {factor[n]:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
             raise InputError("laws.drag", self.law_name, "a law that is finite and not negative", at)
+
+
+@threaded
+def _drag_alone(force, conductance, fluctuation, alone, volume, drag, over_volume):
+    """Force of the drag law alone on every particle, and the same over its volume (N, 3) [N], [N/m3].
+
+    force        of the line of drag on the slip of the cells and its fluctuation (N, 3) [N]
+    conductance  of this line (N,) [kg/s]
+    fluctuation  of the fluid velocity (N, 3), or (0, 3) without any [m/s]
+    alone        conductance of the drag law alone (N,) [kg/s]
+    """
+    fluctuates = len(fluctuation) > 0
+    for n in prange(len(drag)):
+        for d in range(3):
+            slip = force[n, d] / max(conductance[n], 1e-300)
+            if fluctuates:
+                slip -= fluctuation[n, d]
+            drag[n, d] = alone[n] * slip
+            over_volume[n, d] = drag[n, d] / volume[n]
+
+
+@threaded
+def _seen_less_that_of_cells(in_solids, in_cells, voidage, company, volume, rest):
+    """Pressure of the drag that every particle sees, less that of the drag in the cells around it (N, 3) [N].
+
+    in_solids, in_cells  drag over volume as it sees it, and drag over fluid as it gathers it (N, 3) [N/m3]
+    company              share of the others in the solids of the cells around (N,) [-]
+    """
+    for n in prange(len(rest)):
+        for d in range(3):
+            of_solids = (1.0 - voidage[n]) / voidage[n] * in_solids[n, d]
+            rest[n, d] = volume[n] * (of_solids - company[n] * in_cells[n, d])
 
 
 @threaded
