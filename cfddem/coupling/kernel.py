@@ -286,7 +286,7 @@ class FilterKernel:
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
-        return self._merged.shared(collected)
+        return self._merged.share(collected)
 
     def _unit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Whole numbers in 1 of each of the values (m,), so many that no sum in a cell is too large; NaN for NaN."""
@@ -330,17 +330,17 @@ class FilterKernel:
     def layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
-        fields = self._merged.averaged(fields)
+        fields = self._merged.average(np.array(fields, float)) if self.grid.walls else fields
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
     def of_deposits(self, deposits: Array) -> Array:
         """Fields (m, nz, ny, nx) of what lies on the cells, per open share of their groups."""
-        return self._merged.shared(deposits)
+        return self._merged.share(np.array(deposits, float))
 
     def of_large_cells(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) with the value of the large cell in all cells of a group."""
-        return self._merged.copied(fields)
+        return self._merged.copy(np.array(fields, float))
 
     def smooth(self, fields: Array, stage: tuple[int, Array] | None = None) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint.
@@ -348,17 +348,25 @@ class FilterKernel:
         stage  one of `stages`; that of the widest kernel if None
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
-        fields = self._merged.averaged(fields)
         if sweeps == 0:
-            return np.array(fields, float)
+            return self._merged.average(np.array(fields, float))
         (now, inside), (other, inside_other) = self._scratch(len(fields))
-        inside[:] = fields
+        inside[:] = fields = self._merged.average(np.array(fields, float))
+        low, high = planes = self._planes(fields, sweeps)
+        other[:, :low] = other[:, high + 1 :] = 0.0
         for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
-            loops.sweep(now, other, strength, *self._gates)
-            self._merged.relax(inside, inside_other)
+            loops.sweep(now, other, planes, strength, *self._gates, self._merged.shares)
             now, inside, other, inside_other = other, inside_other, now, inside
-        return self._merged.copied(inside.copy())
+        return self._merged.copy(inside.copy())
+
+    def _planes(self, fields: Array, sweeps: int) -> tuple[int, int]:
+        """First and last plane, of padded fields, that so many sweeps reach: all of a grid that others go on."""
+        count = self.grid.shape[0]
+        if self.periodic[2] or self.grid.communicator.size > 1:
+            return 1, count
+        taken = np.flatnonzero(fields.any(axis=(0, 2, 3))) + 1
+        return (max(int(taken[0]) - sweeps, 1), min(int(taken[-1]) + sweeps, count)) if len(taken) else (1, 0)
 
     def _scratch(self, count: int) -> list[tuple[Array, Array]]:
         """Two arrays for so many padded fields, each with a view without its ghosts; the same in every call."""

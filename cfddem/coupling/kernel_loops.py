@@ -274,19 +274,23 @@ def gather_over_steps(at_earlier, at_last, at_now, corners, fields, values):
 
 
 @threaded
-def sweep(fields, out, strength, gate_x, gate_y, gate_z):
-    """One sweep of diffusion through the open faces of all cells; all arrays are padded by one layer.
+def sweep(fields, out, planes, strength, gate_x, gate_y, gate_z, shares):
+    """One sweep of diffusion through the open faces of the cells; all arrays are padded by one layer.
 
     Ghosts of `fields` are current; those of `out` are not written.
+
+    planes  first and last plane along z that is swept, of the padded arrays
+    shares  open share of the group of every cell (nz, ny, nx); (0, 0, 0) where every cell is a group
     """
-    nz, ny, nx = fields.shape[1] - 2, fields.shape[2] - 2, fields.shape[3] - 2
-    for plane in prange(fields.shape[0] * nz):
-        m, k = plane // nz, plane % nz + 1
+    (low, high), ny, nx = planes, fields.shape[2] - 2, fields.shape[3] - 2
+    count, in_groups = high + 1 - low, len(shares) > 0
+    for plane in prange(fields.shape[0] * count):
+        m, k = plane // count, plane % count + low
         field = fields[m]
         for j in range(1, ny + 1):
             for i in range(1, nx + 1):
                 here = field[k, j, i]
-                out[m, k, j, i] = here + (
+                change = (
                     strength[0] * gate_x[k, j, i] * (field[k, j, i - 1] - here)
                     + strength[0] * gate_x[k, j, i + 1] * (field[k, j, i + 1] - here)
                     + strength[1] * gate_y[k, j, i] * (field[k, j - 1, i] - here)
@@ -294,6 +298,7 @@ def sweep(fields, out, strength, gate_x, gate_y, gate_z):
                     + strength[2] * gate_z[k, j, i] * (field[k - 1, j, i] - here)
                     + strength[2] * gate_z[k + 1, j, i] * (field[k + 1, j, i] - here)
                 )
+                out[m, k, j, i] = here + (change / shares[k - 1, j - 1, i - 1] if in_groups else change)
 
 
 @serial

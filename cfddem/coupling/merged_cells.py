@@ -9,7 +9,6 @@ The groups are those of the whole box, see :class:`cfddem.fluid.cell_groups.Grou
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -23,25 +22,26 @@ from cfddem.fluid.halo import Halo
 
 
 class SingleCells:
-    """Of a grid without smooth walls: every cell is its own group. `grid` is the one that particles reach."""
+    """Of a grid without smooth walls: every cell is its own group.
+
+    grid    that particles reach
+    shares  open volume of the group of every cell over that of a cell (nz, ny, nx); (0, 0, 0) if each is a group
+    """
 
     def __init__(self, grid: Grid) -> None:
-        self.grid = grid
+        self.grid, self.shares = grid, np.empty((0, 0, 0))
 
-    def shared(self, deposits: Array) -> Array:
-        """Deposits (m, nz, ny, nx) over the open share of their groups, in all cells of these."""
+    def share(self, deposits: Array) -> Array:
+        """Deposits (m, nz, ny, nx), made deposits over the open share of their groups, in all cells of these."""
         return deposits
 
-    def averaged(self, fields: Array) -> Array:
-        """Mean of fields (m, nz, ny, nx) over the groups, in all cells of these."""
+    def average(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx), made their means over the groups, in all cells of these."""
         return fields
 
-    def copied(self, fields: Array) -> Array:
-        """Fields (m, nz, ny, nx) with the value of the large cell in all cells of a group."""
+    def copy(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx), given the value of the large cell in all cells of a group."""
         return fields
-
-    def relax(self, before: Array, after: Array) -> None:
-        """Divide what a sweep has changed by the open share of the groups, in place."""
 
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
         """What may pass through the low face of every cell in a sweep, for x, y, z; padded: 0 at walls and solid
@@ -59,38 +59,35 @@ class MergedCells(SingleCells):
         cells = replace(whole, solid=self._groups.small, walls=None)
         super().__init__(Block(cells, grid.division, grid.communicator) if isinstance(grid, Block) else cells)
         self._box: CutCells = cut_cells_of_box(whole, tuple(bool(axis) for axis in periodic))
-        at, self._total = self._groups.at, np.ones(grid.shape)
-        self._total.reshape(-1)[at] = self._groups.total
-        self._open = self._groups.volume.ravel()[at]
+        self._at, self._total = self._groups.at, self._groups.total
+        self._open, self.shares = self._groups.volume.ravel()[self._at], np.ones(grid.shape)
+        self.shares.reshape(-1)[self._at] = self._total
 
-    def shared(self, deposits: Array) -> Array:
-        """See `SingleCells.shared`."""
-        return self._with_group_values(deposits, self._groups.copied) / self._total
+    def share(self, deposits: Array) -> Array:
+        """See `SingleCells.share`."""
+        return self._put(deposits, self._groups.copied(self._taken(deposits)) / self._total)
 
-    def averaged(self, fields: Array) -> Array:
-        """See `SingleCells.averaged`."""
-        return self._with_group_values(
-            fields, lambda values: self._groups.summed(values * self._open) / self._groups.total
-        )
+    def average(self, fields: Array) -> Array:
+        """See `SingleCells.average`."""
+        return self._put(fields, self._groups.summed(self._taken(fields) * self._open) / self._total)
 
-    def copied(self, fields: Array) -> Array:
-        """See `SingleCells.copied`."""
-        return self._with_group_values(fields, self._groups.copied)
+    def copy(self, fields: Array) -> Array:
+        """See `SingleCells.copy`."""
+        return self._put(fields, self._groups.copied(self._taken(fields)))
 
-    def _with_group_values(self, fields: Array, of_groups: Callable[[Array], Array]) -> Array:
-        """A copy of fields (m, nz, ny, nx) with other values in the cells of groups."""
-        taken = np.array(fields, float)
-        flat, at = taken.reshape(len(taken), -1), self._groups.at
-        flat[:, at] = of_groups(flat[:, at])
-        return taken
+    def _taken(self, fields: Array) -> Array:
+        """Values of fields (m, nz, ny, nx) in the cells of groups (m, n)."""
+        return fields.reshape(len(fields), -1).take(self._at, axis=1)
 
-    def relax(self, before: Array, after: Array) -> None:
-        """See `SingleCells.relax`."""
-        after[:] = before + (after - before) / self._total
+    def _put(self, fields: Array, values: Array) -> Array:
+        """Fields (m, nz, ny, nx), contiguous, given these values (m, n) in the cells of groups."""
+        for field, value in zip(fields, values):
+            field.reshape(-1)[self._at] = value
+        return fields
 
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
         """See `SingleCells.gates`; never more than a group is open, so that sweeps stay stable."""
-        total, gates = halo.padded(self._total), super().gates(halo)
+        total, gates = halo.padded(self.shares), super().gates(halo)
         grid, apertures = self.grid, self._box.grid.inner(self._box.aperture)
         least = [np.minimum(total, np.roll(total, 1, axis=2 - axis)) for axis in range(3)]
         x, y, z = (
