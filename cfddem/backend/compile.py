@@ -7,6 +7,7 @@
     part           a loop over `prange` that is part of a larger one, and is kept with that; for threads as `either`
     threaded_part  the same, on all threads
     vector_part    as `part`, over arrays that do not overlap: on several rows at once where the processor can
+    vector_piece   the same for one thread, also where the loop around it runs on all
     inline         a helper, compiled into the loops that call it
     vector_inline  as `inline`, for loops over arrays that do not overlap
     fused          as `inline`; a product and the sum that it enters may be rounded once, where the processor can
@@ -71,6 +72,7 @@ __all__ = [
     "use_threads",
     "vector_inline",
     "vector_part",
+    "vector_piece",
 ]
 
 if "OMP_WAIT_POLICY" not in os.environ:
@@ -192,6 +194,11 @@ def vector_part(function: Callable[..., Any]) -> Any:
     The compiler may then work on several rows at once, as it does by itself in loops for all threads.
     """
     return _marked(_linked(function, noalias=True, forceinline=False), vector_part)
+
+
+def vector_piece(function: Callable[..., Any]) -> Any:
+    """Compile a loop as `vector_part` does for one thread, also where several threads share its rows piece by piece."""
+    return _marked(_linked(function, noalias=True, forceinline=False), vector_piece)
 
 
 def vector_inline(function: Callable[..., Any]) -> Any:

@@ -36,7 +36,7 @@ from cfddem.particles.interactions.film import film_force, update_edge_film
 from cfddem.particles.interactions.joint_films import find_due, list_due
 from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.interactions.kinematics import wall_kinematics
-from cfddem.particles.interactions.pair_loops import edge_contact
+from cfddem.particles.interactions.pair_loops import FEW, PIECE, REST, edge_contact
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BOND,
@@ -52,7 +52,11 @@ from cfddem.particles.interactions.slots import (
     SHEAR,
     TRIANGLES,
     clear_contact,
+    find_touching,
+    pack_contacts,
+    packed_forces,
     pair_forces,
+    unpack_contacts,
     update_films,
 )
 from cfddem.particles.pair_graph import edge_role, places_of
@@ -88,6 +92,33 @@ def wall_contact(k, system, step):
     kinematics = wall_kinematics(k, system)
     row = table[particles.material[i], walls.material[j]]
     edge_contact(k, kinematics, row, part, memory, p, step)
+
+
+@part
+def contacts_of_pairs(system, step):
+    """Contacts of all pairs of particles: where few of a piece touch, of those that do, or did at the last step."""
+    pairs, packed, wait = may_touch(system.edges), system.packed, system.packed.wait
+    room, pieces = len(packed.row) // CHUNKS, len(wait)
+    for chunk in prange(CHUNKS):
+        to = chunk * room
+        for piece in range(chunk * pieces // CHUNKS, (chunk + 1) * pieces // CHUNKS):
+            begin, end = piece * PIECE, min((piece + 1) * PIECE, pairs)
+            if wait[piece] > 1:
+                wait[piece] -= 1
+                pair_forces(begin, end, system, step)
+                continue
+            find_touching(begin, end, system)
+            touching = 0
+            for k in range(begin, end):
+                touching += system.memory.touching[k] & 1
+            few = touching < FEW * (end - begin)
+            if few and wait[piece] == 0:
+                last = pack_contacts(begin, end, to, system)
+                packed_forces(to, last, system, step)
+                unpack_contacts(to, last, system)
+            else:
+                pair_forces(begin, end, system, step)
+            wait[piece] = 0 if few else REST
 
 
 @part
@@ -127,7 +158,7 @@ def find_forces(system, step):
     edges = system.edges
     if FILM:
         update_films(0, edges.between_particles, system, step)
-    pair_forces(0, may_touch(edges), system, step)
+    contacts_of_pairs(system, step)
     wall_forces(system, step)
     if FILM and not DRIFTING:
         add_film_forces(system)

@@ -302,8 +302,8 @@ def between(i, j, image, position, shift):
     # the three digits of the image by integer arithmetic, which is faster than a table
     code = np.int64(image)
     x = (code * 57) >> 9
-    y = ((code - 9 * x) * 11) >> 5
-    z = code - 9 * x - 3 * y
+    y = (((code - 9 * x) * 11) >> 5) & 3  # two bits are all, which the compiler would not know by itself
+    z = (code - 9 * x - 3 * y) & 3
     away = (shift[_LAST] * (x - 1.0), shift[_LAST + _1] * (y - 1.0), shift[_LAST + _2] * (z - 1.0))
     return plus(minus(at(position, i), at(position, j)), away)
 

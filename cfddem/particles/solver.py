@@ -23,7 +23,7 @@ from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
-from cfddem.particles.interactions.pair_loops import loop_choices
+from cfddem.particles.interactions.pair_loops import PIECE, PLACES, PackedFields, loop_choices
 from cfddem.particles.listing import NeighbourLists
 from cfddem.particles.named_state import named_state, restored_list
 from cfddem.particles.pair_graph import Edges, gaps, shifts
@@ -126,7 +126,11 @@ class ParticleSolver:
         triangles = len(self.walls.cell_member) > 0
         choices = self.laws.choices() | {"TRIANGLES": triangles, "RECORD": record}
         self.parameters = self.laws.parameters(gravity, settings.free)
-        self.choices: Mapping[str, Any] = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
+        packed = PackedFields(self.laws.contact_fields, [field for field in self.pair_fields if field.name in PLACES])
+        self.choices: Mapping[str, Any] = choices | loop_choices(
+            self.pair_fields, packed, choices, kept_apart, self.parameters
+        )
+        self._packed = packed.room()
         self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
         self._touch_walls = specialise(wall_contacts, self.choices)
         self.free = settings.free
@@ -355,11 +359,13 @@ class ParticleSolver:
         self.edges, self._owned = edges, self.particles.owned
         for feature in self.features:
             self.walls = feature.with_room(self.walls, edges)
+        pieces = -(-edges.between_particles // PIECE)
+        packed = self._packed._replace(wait=np.ones(pieces, np.uint8))
         self._origin: np.ndarray = self.particles.position.copy()
         self._listed_walls = checkpoint_walls(self.walls)
         self.system = System(
             self.particles.view_with(self.laws.particle_fields()), edges.flat_graph, edges.memory, flat(self.walls),
-            shifts(self.box).reshape(-1), self.table, self.parameters, self.film_counts,
+            shifts(self.box).reshape(-1), self.table, self.parameters, self.film_counts, packed,
         )  # fmt: skip
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from cfddem.backend.compile import inline
 from cfddem.model.fields import Field
 from cfddem.particles.interactions.slots import (
@@ -36,6 +38,10 @@ FIELDS = (
     Field("spring", "m", 3, "memory", meaning="tangential displacement of the contact"),
     Field("minimum_gap", "m", role="memory", meaning="gap below which the solids touch: h_min, or reach of adhesion"),
 )
+TOUCHING = Field(
+    "touching", role="scratch", dtype=np.uint8, initial=1.0, meaning="1 where solids touch, and 2 more where they did"
+)
+"""Of the last two steps. Where it is zero, nothing of a contact has to be renewed; it is not in a new list."""
 
 
 @inline

@@ -171,7 +171,7 @@ class Laws(NamedTuple):
 
     def fields(self) -> list[Field]:
         """What pairs remember under these laws, and what the loops write for each pair."""
-        fields = [*contact.FIELDS, *self.contact_law.memory]
+        fields = [*self.contact_fields, contact.TOUCHING]
         if self.film:
             fields += film.FIELDS
         if self.drifting:
@@ -184,14 +184,17 @@ class Laws(NamedTuple):
             fields += joint_films.BRIDGE_FIELDS
         if self.slides:
             fields += joint_films.SLIDING_FIELDS
-        if self.rolling != "none":
-            fields += rolling.FIELDS
         fields += self.bridges.fields
         if self.apart:
             fields += bridge_apart.FIELDS
         if self.minimum_gap is not None or self.lubrication is not None:
             fields.append(film.OUTSIDE)
         return fields
+
+    @property
+    def contact_fields(self) -> list[Field]:
+        """What pairs remember of their contacts, and what the loop over contacts writes."""
+        return [*contact.FIELDS, *self.contact_law.memory, *(rolling.FIELDS if self.rolling != "none" else ())]
 
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
@@ -258,7 +261,15 @@ ARGUMENTS = "contact, row, p, m, d"
 
 TAKEN = {
     field.name
-    for field in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *shear_film.FIELDS, *rolling.FIELDS, *RECORD_FIELDS)
+    for field in (
+        *contact.FIELDS,
+        contact.TOUCHING,
+        *film.FIELDS,
+        film.OUTSIDE,
+        *shear_film.FIELDS,
+        *rolling.FIELDS,
+        *RECORD_FIELDS,
+    )
 }
 TAKEN |= {field.name for field in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields)
 """Names of the built-in fields of pairs."""

@@ -2,17 +2,24 @@
 
 The compiler does so only where it sees that no two arrays overlap: arrays must come as arguments of the loop, one by
 one. `over_pairs` writes such a loop around a function of one pair that takes its arrays in structures.
+
+Of the listed pairs of a loose bed few touch. A short loop finds those whose contacts are to be renewed, as the bodies
+touch, or did at the last step. What these remember is packed, the loop over contacts runs over the packed pairs, and
+its results go back to their places: some hundred pairs at a time, which stay in the cache meanwhile. Where most pairs
+touch, the same loop runs over them as they are, and whether they still do is asked from time to time.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections import namedtuple
 from collections.abc import Callable, Collection, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import inline, kept_whole, prange, vector_part
+from cfddem.backend.compile import CHUNKS, inline, kept_whole, prange, vector_part, vector_piece
 from cfddem.backend.law_set import compile_source, specialise
 from cfddem.backend.named import named_arrays
 from cfddem.model.fields import Field
@@ -30,7 +37,9 @@ from cfddem.particles.interactions.slots import (
     BRIDGE,
     BRIDGE_APART,
     BRIDGE_PULL,
+    DRIFTING,
     DRYING,
+    FILM,
     ROLLING,
     SHEAR,
     adhesive_reach,
@@ -47,6 +56,12 @@ PairParticles = namedtuple("PairParticles", "position velocity spin radius inver
 
 PairEnds = namedtuple("PairEnds", "first second image")
 """Arrays of the graph that loops over pairs read."""
+
+PIECE = 512
+"""Listed pairs of which those that touch are packed at a time."""
+
+FEW, REST = 0.6, 16
+"""Share of pairs that touch below which these are packed, and steps until more pairs than that are asked again."""
 
 
 @inline
@@ -73,14 +88,30 @@ def edge_contact(k, kinematics, row, share, memory, p, step):
 
 
 @inline
+def _apart(k, system):
+    """Separation of a pair, its length, and the sum of the radii."""
+    return kept_separation(k, system) if BRIDGE else of_two_spheres(k, system.particles, system.edges, system.shift)
+
+
+@inline
+def pair_touches(n, system):
+    """Note whether the solids of one pair of particles touch, and whether they did at the last step."""
+    memory, k = system.memory, np.uint64(n)
+    _, distance, radii = _apart(k, system)
+    touches = 1 if distance - radii < memory.minimum_gap[k] else 0
+    if FILM and not DRIFTING:  # the force of the film has been added to that of the contact
+        touches = 1
+    memory.touching[k] = 2 * (memory.touching[k] & 1) + touches
+
+
+@inline
 def pair_force(n, system, step):
     """Contact of one pair of particles."""
     memory, p = system.memory, system.parameters
     k = np.uint64(n)
     particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
-    apart = kept_separation(k, system) if BRIDGE else of_two_spheres(k, particles, edges, system.shift)
-    kinematics = sphere_kinematics(k, apart, system)
+    kinematics = sphere_kinematics(k, _apart(k, system), system)
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
 
@@ -175,39 +206,109 @@ class PairLoop(NamedTuple):
     rest: str = "step"  # what it takes beside the system
     particles: Any = PairParticles  # arrays of the particles that it reads
     needed_by: str = ""  # choice without which a run has no such loop
+    how: Any = vector_part  # it is compiled
+    twin: str = ""  # slot of the same loop over packed pairs
 
 
 LOOPS: dict[str, PairLoop] = {
-    "pair_forces": PairLoop(pair_force),
+    "find_touching": PairLoop(pair_touches, rest="", how=vector_piece),
+    "pair_forces": PairLoop(pair_force, how=vector_piece, twin="packed_forces"),
     "update_films": PairLoop(pair_film, needed_by="FILM"),
     "pair_bridges": PairLoop(pair_bridge, particles=WetParticles, needed_by="BRIDGE"),
 }
 """Slot -> loop over pairs."""
 
+PLACES = ("bridge_separation", "bridge_distance")
+"""Fields of the present positions, where a loop before that over contacts has found them."""
+
+WRITTEN = ("force", "couple", "moment")
+"""Fields of a contact that are written anew without being read."""
+
 
 def loop_choices(
-    fields: Iterable[Field], choices: dict[str, Any], kept_apart: Collection[str], parameters: Parameters
+    fields: Iterable[Field],
+    packed: PackedFields,
+    choices: dict[str, Any],
+    kept_apart: Collection[str],
+    parameters: Parameters,
 ) -> dict[str, Any]:
     """What goes into the slots of the loops over pairs that carry these fields.
 
+    packed      what is packed for contacts
     kept_apart  fields that inactive triangles do not take over
     parameters  of the run; their names count
     """
     fields = list(fields)
     memory = named_arrays("Memory", tuple(field.name for field in fields))
-    loops = {slot: over_pairs(specialise(loop.body, choices), loop.rest, loop.particles, memory, parameters)
-             for slot, loop in LOOPS.items() if choices.get(loop.needed_by, True)}  # fmt: skip
-    lines = ["put(memory.{0}, to, at(memory.{0}, k))" if field.components else "memory.{0}[to] = memory.{0}[k]"
-             for field in fields]  # fmt: skip
-    copied = [line.format(field.name) for line, field in zip(lines, fields)
-              if field.role == "memory" and field.name not in kept_apart]  # fmt: skip
+    loops: dict[str, Any] = {}
+    for slot, loop in LOOPS.items():
+        if choices.get(loop.needed_by, True):
+            arrays = packed.memory if loop.twin else memory
+            loops |= over_pairs(slot, loop, specialise(loop.body, choices), arrays, parameters)
+    copied = [_copied(field, "memory", "to", "memory", "k")
+              for field in fields if field.role == "memory" and field.name not in kept_apart]  # fmt: skip
     return {
         **loops,
+        **packed.loops(),
         "copy_memory": compile_source(
             "def copy_memory(memory, k, to):\n    " + "\n    ".join(copied) + "\n", put=put, at=at
         ),
         "clear_contact": specialise(_clear_contact, choices),
     }
+
+
+def _copied(field: Field, to: str, row: str, source: str, k: str) -> str:
+    """The line of a loop that copies the value of a field."""
+    if field.components:
+        return f"put({to}.{field.name}, {row}, at({source}.{field.name}, {k}))"
+    return f"{to}.{field.name}[{row}] = {source}.{field.name}[{k}]"
+
+
+class PackedFields(NamedTuple):
+    """What is packed of the pairs that touch."""
+
+    contact: list[Field]  # of the contact
+    geometry: list[Field]  # what loops before have found, and the contact reads
+
+    @property
+    def memory(self) -> Any:
+        """The class of the arrays of pairs that the loop over contacts takes."""
+        return named_arrays("Memory", tuple(field.name for field in (*self.contact, *self.geometry)))
+
+    def room(self) -> Any:
+        """Arrays for a piece of the pairs of each chunk: "row" in the list, ends, and fields; "wait" of each piece."""
+        number, fields = CHUNKS * (PIECE + 1), (*self.contact, *self.geometry)
+        kinds = {"row": np.uint32, "first": np.uint32, "second": np.uint32, "image": np.uint8, "wait": np.uint8}
+        arrays = {name: np.empty(number, kind) for name, kind in kinds.items()}
+        arrays |= {field.name: np.empty(number * math.prod(field.shape), field.dtype) for field in fields}
+        return named_arrays("Memory", tuple(arrays))(**arrays)
+
+    def loops(self) -> dict[str, Any]:
+        """Loops that pack contacts, and that bring them back."""
+        read = [field for field in self.contact if field.name not in WRITTEN] + self.geometry
+        ends = [f"packed.{name}[n] = edges.{name}[k]" for name in PairEnds._fields]
+        taken = [*ends, *(_copied(field, "packed", "n", "memory", "k") for field in read)]
+        returned = [_copied(field, "memory", "k", "packed", "n") for field in self.contact]
+        pack = (
+            "def pack_contacts(begin, end, to, system):\n"
+            "    edges, memory, packed, last = system.edges, system.memory, system.packed, to\n"
+            "    for k in range(begin, end):\n"
+            "        packed.row[last] = k\n"
+            "        last += 1 if memory.touching[k] != 0 else 0\n"
+            "    for n in range(to, last):\n"
+            "        k = packed.row[n]\n        " + "\n        ".join(taken) + "\n"
+            "    return last\n"
+        )
+        unpack = (
+            "def unpack_contacts(begin, end, system):\n"
+            "    memory, packed = system.memory, system.packed\n"
+            "    for n in range(begin, end):\n"
+            "        k = packed.row[n]\n        " + "\n        ".join(returned) + "\n"
+        )
+        return {
+            "pack_contacts": compile_source(pack, put=put, at=at),
+            "unpack_contacts": compile_source(unpack, put=put, at=at),
+        }
 
 
 @inline
@@ -221,36 +322,43 @@ def _clear_contact(memory, k):
     write_memory(memory, k, read_memory(memory, k), False)
 
 
-def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Parameters) -> Any:
+def over_pairs(slot: str, of: PairLoop, body: Any, memory: Any, parameters: Parameters) -> dict[str, Any]:
     """A loop `(begin, end, system, rest)` over pairs, with each array and number an argument of its own.
 
-    body       (n, system, rest), compiled by `inline`, where the system is a `PairSystem`
-    rest       further arguments
-    particles  arrays of the particles that the body reads
-    memory     arrays of the pairs
+    slot     of the loop
+    of       what it takes
+    body     (n, system, rest), compiled by `inline`, where the system is a `PairSystem`
+    memory   arrays of the pairs
+    returns  slot -> loop; also for packed pairs, which is the same machine code
     """
     arrays = {name: kind(*kind._fields) for name, kind in
-              (("particles", particles), ("edges", PairEnds), ("memory", memory))}  # fmt: skip
+              (("particles", of.particles), ("edges", PairEnds), ("memory", memory))}  # fmt: skip
     system = PairSystem(**arrays, shift="shift", rows="rows", kinds="kinds", parameters=parameters)  # type: ignore[arg-type]
     structures: dict[str, Any] = {}
     rebuilt = _rebuilt(system, "system", structures)
     places = _places(system, "system")
     names = ", ".join(place.replace(".", "_") for place in places)
-    more = f", {rest}" if rest else ""
+    more = f", {of.rest}" if of.rest else ""
     loop = (
         f"def over_pairs(begin, end, {names}{more}):\n"
         f"    kept_whole()\n"
         f"    for n in prange(begin, end):\n"
         f"        body(n, {rebuilt}{more})\n"
     )
+    made_loop = compile_source(loop, of.how, body=body, prange=prange, kept_whole=kept_whole, **structures)
     arguments = ", ".join({"system.rows": "rows", "system.kinds": "kinds"}.get(place, place) for place in places)
+    calls = {slot: arguments}
+    if of.twin:
+        calls[of.twin] = re.sub(r"system\.(edges|memory)\.", "system.packed.", arguments)
     call = (
         f"def call(begin, end, system{more}):\n"
         f"    kinds, rows = uint64(len(system.table)), system.table.reshape(-1)\n"
-        f"    over_pairs(begin, end, {arguments}{more})\n"
+        f"    over_pairs(begin, end, {{}}{more})\n"
     )
-    made_loop = compile_source(loop, vector_part, body=body, prange=prange, kept_whole=kept_whole, **structures)
-    return compile_source(call, over_pairs=made_loop, uint64=np.uint64)
+    return {
+        name: compile_source(call.format(taken), over_pairs=made_loop, uint64=np.uint64)
+        for name, taken in calls.items()
+    }
 
 
 def _places(value: Any, place: str) -> list[str]:

@@ -138,7 +138,11 @@ returned_share = Slot("returned_share")  # (both radii, both contact angles): pa
 
 TRIANGLES = Slot("TRIANGLES")  # some walls are surfaces of triangles
 RECORD = Slot("RECORD")  # collisions are recorded
+find_touching = Slot("find_touching")
+pack_contacts = Slot("pack_contacts")  # (begin, end, to, system) -> end of the packed
+packed_forces = Slot("packed_forces")  # (begin, end, system, step), over packed pairs
 pair_forces = Slot("pair_forces")
+unpack_contacts = Slot("unpack_contacts")  # (begin, end, system)
 update_films = Slot("update_films")
 pair_bridges = Slot("pair_bridges")
 copy_memory = Slot("copy_memory")  # (memory arrays, from, to)
