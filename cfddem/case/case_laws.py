@@ -106,7 +106,7 @@ class CaseLaws(Checked):
     surface: Literal["auto", "smeared", "sharp"] = Field(
         "auto",
         description="what particles at the surface of a bed see: smeared by the kernel; sharp, the suspension that "
-        "they belong to, in model A; or auto (sharp in a liquid, smeared in a gas and in model B)",
+        "they belong to, in model A; or auto (sharp in model A, smeared in model B)",
     )
     self_disturbance_correction: bool = Field(
         True, description="remove the disturbance that each particle causes at its own position from the sampled flow"

@@ -194,35 +194,27 @@ class Case(CaseTables):
     def surface(self) -> Literal["smeared", "sharp"]:
         """What particles at the surface of a bed see.
 
-        `laws.surface = "auto"` is sharp in a liquid, in model A with a law of drag, and smeared in a gas and in model
-        B. Gas beds were compared with measurements with smeared surfaces only.
+        `laws.surface = "auto"` is sharp in model A with a law of drag and a kernel, and smeared in model B.
         """
         return self._surface_and_reason[0]
 
     @property
     def surface_in_words(self) -> str:
-        """What particles at the surface of a bed see, and why; empty for one sphere, and where nothing resists it.
-
-        A smeared surface in a gas is not worth a word either.
-        """
+        """What particles at the surface of a bed see, and why; empty for one sphere, and where nothing resists it."""
         surface, reason = self._surface_and_reason
-        if not self.resists or self.is_one_sphere or not (self.in_liquid or surface == "sharp"):
-            return ""
-        return f"{surface}, the default {reason}" if reason else surface
+        return f"{surface}{reason}" if self.resists and not self.is_one_sphere else ""
 
     @property
     def _surface_and_reason(self) -> tuple[Literal["smeared", "sharp"], str]:
-        """What particles at the surface of a bed see, and where that is the default; no reason if the case says it."""
+        """What particles at the surface of a bed see, and why that is the default; no reason if the case says it."""
         laws = self.laws
         if laws.surface != "auto":
             return laws.surface, ""
-        if not self.in_liquid:
-            return "smeared", "in a gas"
-        if laws.model == "B" or laws.drag_law is None:
-            return "smeared", "in model B" if laws.model == "B" else "without drag"
-        if laws.kernel_width == 0.0 or self.is_one_sphere:
-            return "smeared", "of one sphere" if self.is_one_sphere else "without a kernel"
-        return "sharp", "in a liquid"
+        if laws.model == "B" or laws.kernel_width == 0.0:
+            return "smeared", ", the default in model B" if laws.model == "B" else ", the default without a kernel"
+        if laws.drag_law is None or self.is_one_sphere:
+            return "smeared", ""
+        return "sharp", ", the default"
 
     @property
     def agitation_factors(self) -> AgitationFactors:

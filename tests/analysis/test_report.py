@@ -308,4 +308,4 @@ def test_voidage_from_the_pressure_gradient() -> None:
 
 def test_the_head_of_a_report_breaks_between_its_parts(tmp_path: Path) -> None:
     head = lines(report(made_up(tmp_path / "run")))[1:3]
-    assert head[0].endswith(";") and head[1] == "  surface of the bed: sharp, the default in a liquid"
+    assert head[0].endswith(";") and head[1] == "  surface of the bed: sharp, the default"

@@ -80,6 +80,7 @@ inlet_velocity = [[0.0, 0.1], [0.1, 0.66]]
 [laws]
 drag = "beetstra"
 lubrication = "none"
+surface = "smeared"
 self_disturbance_correction = false
 [run]
 until = 1.0
@@ -106,6 +107,7 @@ def settling_sphere() -> State:
 @golden
 def packed_bed() -> State:
     small = {"column__width": 0.006, "column__height": 0.012, "bed__count": 450, "run__fluid_step": 0.002}
+    small["laws__surface"] = "smeared"
     return state_of(coupled(SCENARIOS / "beds" / "packed_bed" / "case.toml", **small))
 
 
@@ -188,6 +190,11 @@ def gas_bed_of_many() -> State:
 
 
 @golden
+def gas_bed_sharp() -> State:
+    return state_of(coupled(SEEDS, laws__surface="sharp", bed__start="packed"))
+
+
+@golden
 def mixture() -> State:
     steps = {"run__particle_step": 1e-5, "run__fluid_step": 3e-4}
     return state_of(coupled(MIXTURE, column__height=0.024, run__until=1.0, laws__surface="smeared", **steps))
@@ -206,7 +213,8 @@ def dry_case() -> State:
     """A case without a fluid."""
     text = SEEDS.split("[material.seed]", 1)[1].replace("inlet_velocity = [[0.0, 0.1], [0.1, 0.66]]", "")
     text = text.replace(
-        'drag = "beetstra"\nlubrication = "none"\nself_disturbance_correction = false', 'contact = "hertz"'
+        'drag = "beetstra"\nlubrication = "none"\nsurface = "smeared"\nself_disturbance_correction = false',
+        'contact = "hertz"',
     )
     return state_of(coupled("[material.seed]" + text, bed__initial_velocity=[0.1, 0.2, -0.3]))
 

@@ -41,25 +41,23 @@ def shown(case: Case) -> dict[str, tuple[float, str]]:
 @pytest.mark.parametrize(
     ("case", "changes", "surface", "words"),
     [
-        (glass(0.037), {}, "sharp", "sharp, the default in a liquid"),
-        (glass(0.024), {}, "sharp", "sharp, the default in a liquid"),
-        (glass(0.037), {"laws.agitation": "none"}, "sharp", "sharp, the default in a liquid"),
-        (alumina(0.157), {}, "sharp", "sharp, the default in a liquid"),
+        (glass(0.037), {}, "sharp", "sharp, the default"),
+        (glass(0.024), {}, "sharp", "sharp, the default"),
+        (glass(0.037), {"laws.agitation": "none"}, "sharp", "sharp, the default"),
+        (alumina(0.157), {}, "sharp", "sharp, the default"),
         (alginate(0.009), {"laws.surface": "sharp"}, "sharp", "sharp"),
         (glass(0.037), {"laws.surface": "smeared"}, "smeared", "smeared"),
         (glass(0.037), {"laws.model": "B"}, "smeared", "smeared, the default in model B"),
         (glass(0.037), {"laws.kernel_width": 0.0}, "smeared", "smeared, the default without a kernel"),
         (glass(0.037), {"laws.drag": "none"}, "smeared", None),
         (glass(0.037), {"bed.count": 1}, "smeared", None),
-        (glass(0.037), VESSEL, "sharp", "sharp, the default in a liquid"),
-        (glass(0.037), THIN_WALL, "sharp", "sharp, the default in a liquid"),
-        (mueller(), {}, "smeared", None),
+        (glass(0.037), VESSEL, "sharp", "sharp, the default"),
+        (glass(0.037), THIN_WALL, "sharp", "sharp, the default"),
+        (mueller(), {}, "sharp", "sharp, the default"),
     ],
 )
-def test_surfaces_are_sharp_by_default_in_liquids(
-    case: Case, changes: dict[str, Any], surface: str, words: str | None
-) -> None:
-    """The same in the run; the check says why. In a gas, of one sphere and without drag it says nothing."""
+def test_surfaces_are_sharp_by_default(case: Case, changes: dict[str, Any], surface: str, words: str | None) -> None:
+    """The same in the run; the check says why. Of one sphere and without drag it says nothing."""
     case = case.with_(**changes)
     assert case.surface == surface
     assert shown(case).get("surface of the bed", (math.nan, None))[1] == words

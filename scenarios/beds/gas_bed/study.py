@@ -1,7 +1,7 @@
 """Bubbling gas beds after experiments, and the standard gas bed, which measures the speed of a coupled run.
 
 The standard bed has the box, particles and gas of Goldschmidt et al. (2004): 24 750 spheres at rest, into which gas
-begins to flow. Its two time steps are prescribed, so that different codes do the same work.
+begins to flow. Its two time steps and its smeared surfaces are prescribed, so that different codes do the same work.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def standard_bed(fluid_step: float = FLUID_STEPS[0]) -> Case:
                 "sides": "no_slip", "front": "free_slip",
             },
             "bed": {"diameter": 2.5e-3, "positions": centres.tolist(), "inlet_velocity": 1.875},
-            "laws": {"drag": "gidaspow", "lubrication": "none", "self_disturbance_correction": False},
+            "laws": {
+                "drag": "gidaspow", "lubrication": "none", "surface": "smeared", "self_disturbance_correction": False,
+            },
             "run": {"until": 1.0, "particle_step": STEP, "fluid_step": fluid_step, "reference_speed": 1.0},
         }
     )  # fmt: skip
