@@ -29,7 +29,7 @@ from cfddem.io.reading import RunData, open_run
 from cfddem.run.history import pressure_drop
 from cfddem.run.simulation import Simulation
 from closures.bed import exponent_richardson_zaki
-from scenarios.beds.defluidisation.study import layers, onsets
+from scenarios.beds.defluidisation.study import onsets
 from scenarios.beds.gas_bed.study import mueller, van_wachem
 from scenarios.beds.liquid_bed.study import alginate
 from scenarios.beds.sedimentation.study import (
@@ -107,7 +107,7 @@ def defluidised(folder: Path, progress: Progress) -> list[Row]:
     assert not isinstance(case.bed.inlet_velocity, float)
     slow = tuple((5.0 * time, speed) for time, speed in case.bed.inlet_velocity)
     run = finished(case, folder, "defluidisation", progress, {"bed.inlet_velocity": slow, "run.until": 6.5})
-    up, down = onsets(case.with_(**{"bed.inlet_velocity": slow}), run.history, layers(run))
+    up, down = onsets(case.with_(**{"bed.inlet_velocity": slow}), run.history)
     return [
         Row("fluidised: minimum velocity over balance, up", up.velocity / up.balance, 1.0, 0.05),
         Row("defluidised: minimum velocity over balance, down", down.velocity / down.balance, 1.0, 0.05),
@@ -290,9 +290,10 @@ def liquid() -> RefinementBed:
 
 
 def gas() -> RefinementBed:
-    """Slugs of air in the narrow column of the gallery's ramp."""
+    """Slugs of air in the narrow column of the gallery's ramp, with smeared surfaces."""
     case = gallery()["defluidisation"]
     changes = {"title": "Slugging bed, for refinement", "bed.inlet_velocity": 0.6, "run.every": 0.25}
+    changes["laws.surface"] = "smeared"
     return RefinementBed(case.with_(**changes), 1.0, 6.0)
 
 

@@ -22,7 +22,7 @@ from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
 from closures.numbers import archimedes
-from scenarios.beds.defluidisation.study import Layers, in_layers, onsets
+from scenarios.beds.defluidisation.study import onsets
 from scenarios.beds.gas_bed import mueller, standard_bed, van_wachem
 from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_box
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
@@ -75,7 +75,7 @@ def test_exponent_of_an_exact_power_law() -> None:
     assert exponent(known) == pytest.approx((3.2, 0.08), rel=1e-12)
 
 
-def exact_ramp() -> tuple[Case, dict[str, np.ndarray], Layers, float]:
+def exact_ramp() -> tuple[Case, dict[str, np.ndarray], float]:
     """Pressure drop by Ergun at voidage 0.42 up to the weight, then the weight; and the balance."""
     case = Case.from_toml(gallery_files()["defluidisation"], {"laws.drag": "ergun"})
     assert case.fluid is not None and not isinstance(case.bed.inlet_velocity, float)
@@ -90,33 +90,24 @@ def exact_ramp() -> tuple[Case, dict[str, np.ndarray], Layers, float]:
 
     weight = buoyant_weight(case) / case.column.floor_area
     drop = weight * np.minimum(pull(velocity) / pull(np.array([balance])), 1.0)
-    bed = Layers(time[::10], np.tile([0.42, 0.42, 1.0], (30, 1)))
-    return case, {"time": time, "pressure_drop": drop}, bed, balance
+    return case, {"time": time, "pressure_drop": drop, "bed_voidage": np.full(300, 0.42)}, balance
 
 
 def test_onset_of_an_exact_bed_is_the_balance() -> None:
-    case, history, bed, balance = exact_ramp()
-    for onset in onsets(case, history, bed):
+    case, history, balance = exact_ramp()
+    for onset in onsets(case, history):
         assert onset.balance == pytest.approx(balance, rel=1e-12)
         assert onset.velocity == pytest.approx(balance, rel=1e-6)
 
 
 def test_spikes_and_bubbles_do_not_move_an_onset() -> None:
     """Single rows of noise in the packed bed, and a pressure drop that falls for a moment while the bed bubbles."""
-    case, history, bed, balance = exact_ramp()
+    case, history, balance = exact_ramp()
     drop, weight = history["pressure_drop"], buoyant_weight(case) / case.column.floor_area
     drop[[2, 297]] = weight
     drop[148:153] = 0.5 * weight
-    for onset in onsets(case, history, bed):
+    for onset in onsets(case, history):
         assert onset.velocity == pytest.approx(balance, rel=0.01)
-
-
-def test_drag_of_a_layered_bed_is_the_sum_over_its_layers() -> None:
-    """At one Reynolds number, the pull on two layers is the sum of both: each sphere at its own voidage."""
-    loose, dense = 0.5, 0.4
-    together = in_layers(ergun, np.array([dense, loose, 1.0]))
-    pulls = [ergun(20.0, own) / own * (1.0 - own) for own in (dense, loose)]
-    assert together(20.0, 0.7) / 0.7 == pytest.approx(sum(pulls) / (2.0 - loose - dense), rel=1e-14)
 
 
 def test_both_sides_of_the_threshold_are_run() -> None:

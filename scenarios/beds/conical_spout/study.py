@@ -73,8 +73,9 @@ def spouting(run: RunData, case: Case) -> Spouting:
     middle = np.s_[:top, ny // 2 - 1 : ny // 2 + 1, nx // 2 - 1 : nx // 2 + 1]
     lowest = [run.fluid("voidage", n)[middle].mean(axis=(1, 2)).min() for n in range(len(run.times))]
     peaks = find_peaks(run.history["pressure_drop"], prominence=PROMINENT)[0]
-    closes = nozzle.speed(float(run.history["time"][peaks[-1]])) if len(peaks) else math.nan
-    return Spouting(np.array(run.times), np.array([nozzle.speed(t) for t in run.times]), np.array(lowest), closes)
+    speeds, at_peaks = ([nozzle.speed(float(t)) for t in times] for times in (run.times, run.history["time"][peaks]))
+    closes = [speed for speed in at_peaks if speed < max(speeds)] or [math.nan]
+    return Spouting(np.array(run.times), np.array(speeds), np.array(lowest), closes[-1])
 
 
 # ---------------------------------------------------------------- figure of the conical spout

@@ -1,5 +1,5 @@
 """A bed in air is fluidised and defluidised on a velocity ramp."""
 
-from scenarios.beds.defluidisation.study import Layers, Onset, layers, onsets
+from scenarios.beds.defluidisation.study import Onset, onsets
 
-__all__ = ["Layers", "Onset", "layers", "onsets"]
+__all__ = ["Onset", "onsets"]

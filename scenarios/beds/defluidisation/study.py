@@ -1,9 +1,8 @@
 """A bed is fluidised and defluidised: minimum fluidisation on the way up and on the way down.
 
 Minimum fluidisation is where the extrapolated pressure drop of the packed bed equals the weight of the bed. It is
-compared with the balance of weight and drag by the drag law, layer by layer, at the voidage of each layer. A bed twenty
-spheres high is loose at its floor and at its top: one voidage for the whole bed, computed from its height, is wrong by
-0.01, which changes the velocity by a tenth.
+compared with the balance of weight and drag by the drag law, at the voidage that the height of the bed gives. A voidage
+that is wrong by 0.01 changes this velocity by a tenth.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from scipy.ndimage import median_filter
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import RunData
-from closures.balance import Drag, fluidising_velocity
+from closures.balance import fluidising_velocity
 
 PACKED = (0.2, 0.8)
 """Range of pressure drop over weight in which the bed counts as packed."""
@@ -29,35 +27,20 @@ class Onset:
     """Minimum fluidisation on one branch of the ramp."""
 
     velocity: float  # superficial, where the pressure drop of the packed bed equals the weight [m/s]
-    voidage: float  # of the packed bed, mean over its particles
-    balance: float  # velocity by the drag law at the voidages of its layers [m/s]
+    voidage: float  # of the packed bed, from its height
+    balance: float  # velocity by the drag law at this voidage [m/s]
 
 
-@dataclass(frozen=True)
-class Layers:
-    """Voidage profiles of a bed over time."""
-
-    time: np.ndarray  # (n,) [s]
-    voidage: np.ndarray  # (n, levels) mean over the column at each level
-
-
-def layers(run: RunData) -> Layers:
-    """Voidage profiles of a run, from its snapshots."""
-    places = range(len(run.times))
-    return Layers(run.times, np.array([run.fluid("voidage", place).mean(axis=(1, 2)) for place in places]))
-
-
-def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[Onset, Onset]:
+def onsets(case: Case, history: Mapping[str, np.ndarray]) -> tuple[Onset, Onset]:
     """Minimum fluidisation on the way up and on the way down; arguments as of `onset`."""
-    return onset(case, history, bed, rising=True), onset(case, history, bed, rising=False)
+    return onset(case, history, rising=True), onset(case, history, rising=False)
 
 
-def onset(case: Case, history: Mapping[str, np.ndarray], bed: Layers, *, rising: bool) -> Onset:
+def onset(case: Case, history: Mapping[str, np.ndarray], *, rising: bool) -> Onset:
     """Minimum fluidisation on one branch of a ramp.
 
     case     whose inlet velocity is a list of [time, velocity] that rises and falls
     history  of its run
-    bed      its voidage profiles, at least one with a packed bed on the branch
     rising   the way up, else the way down
     """
     inlet = case.bed.inlet_velocity
@@ -68,12 +51,8 @@ def onset(case: Case, history: Mapping[str, np.ndarray], bed: Layers, *, rising:
     packed = _packed(share, (history["time"] < times[int(np.argmax(speeds))]) == rising, rising)
     if packed.sum() < 4:
         raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
-    begin, end = history["time"][packed][[0, -1]]
-    voidages = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
-    if len(voidages) == 0:
-        raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
     velocity = np.interp(history["time"], times, speeds)
-    return _onset(case, velocity[packed], share[packed], voidages.mean(axis=0))
+    return _onset(case, velocity[packed], share[packed], float(history["bed_voidage"][packed].mean()))
 
 
 def _packed(share: np.ndarray, branch: np.ndarray, rising: bool) -> np.ndarray:
@@ -87,30 +66,13 @@ def _packed(share: np.ndarray, branch: np.ndarray, rising: bool) -> np.ndarray:
     return np.asarray(branch & still & (steady > PACKED[0]))
 
 
-def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:
+def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: float) -> Onset:
     powers = np.stack([velocity, velocity**2], axis=1)
     (viscous, inertial), *_ = np.linalg.lstsq(powers, share, rcond=None)
     onset_velocity = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
     assert case.laws.drag_law is not None
-    own = float(np.average(voidage, weights=1.0 - voidage))
     balance = fluidising_velocity(
-        case.bed.diameter, case.solid.density, case.required_fluid.density, case.required_fluid.viscosity, own,
-        in_layers(case.laws.drag_law.function, voidage), abs(case.laws.gravity[2]),
+        case.bed.diameter, case.solid.density, case.required_fluid.density, case.required_fluid.viscosity, voidage,
+        case.laws.drag_law.function, abs(case.laws.gravity[2]),
     )  # fmt: skip
-    return Onset(float(onset_velocity), own, balance)
-
-
-def in_layers(drag: Drag, voidages: np.ndarray) -> Drag:
-    """A drag law for a bed in layers: all layers see the same stream, each particle the voidage of its own layer.
-
-    drag      F(reynolds, voidage)
-    voidages  (levels,) of layers of the same thickness
-    returns   F such that F / voidage is the mean over all particles, for any voidage that is passed
-    """
-    solids = 1.0 - voidages
-    filled = [(share, own) for share, own in zip(solids / solids.sum(), voidages.tolist()) if share > 0.0]
-
-    def mean(reynolds: float, voidage: float) -> float:
-        return voidage * sum(share * drag(reynolds, own) / own for share, own in filled)
-
-    return mean
+    return Onset(float(onset_velocity), voidage, balance)
