@@ -330,17 +330,17 @@ class FilterKernel:
     def layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
-        fields = self._merged.average(np.array(fields, float)) if self.grid.walls else fields
+        fields = self._merged.average(np.array(fields, float, order="C")) if self.grid.walls else fields
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
     def of_deposits(self, deposits: Array) -> Array:
         """Fields (m, nz, ny, nx) of what lies on the cells, per open share of their groups."""
-        return self._merged.share(np.array(deposits, float))
+        return self._merged.share(np.array(deposits, float, order="C"))
 
     def of_large_cells(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) with the value of the large cell in all cells of a group."""
-        return self._merged.copy(np.array(fields, float))
+        return self._merged.copy(np.array(fields, float, order="C"))
 
     def smooth(self, fields: Array, stage: tuple[int, Array] | None = None) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint.
@@ -349,16 +349,16 @@ class FilterKernel:
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
         if sweeps == 0:
-            return self._merged.average(np.array(fields, float))
+            return self._merged.average(np.array(fields, float, order="C"))
         (now, inside), (other, inside_other) = self._scratch(len(fields))
-        inside[:] = fields = self._merged.average(np.array(fields, float))
+        inside[:] = fields = self._merged.average(np.array(fields, float, order="C"))
         low, high = planes = self._planes(fields, sweeps)
         other[:, :low] = other[:, high + 1 :] = 0.0
         for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
             loops.sweep(now, other, planes, strength, *self._gates, self._merged.shares)
             now, inside, other, inside_other = other, inside_other, now, inside
-        return self._merged.copy(inside.copy())
+        return self._merged.copy(np.array(inside, order="C"))
 
     def _planes(self, fields: Array, sweeps: int) -> tuple[int, int]:
         """First and last plane, of padded fields, that so many sweeps reach: all of a grid that others go on."""
@@ -413,7 +413,7 @@ class FilterKernel:
         other, passed = np.empty_like(change), np.zeros_like(change)
         for _ in range(self.sweeps):
             passed += change
-            loops.sweep(change, other, self.strength, *self._gates)
+            loops.sweep(change, other, (1, grid.shape[0]), self.strength, *self._gates, self._merged.shares)
             self.halo.fill(other)
             change, other = other, change
         for axis in range(3):

@@ -103,7 +103,9 @@ def _normals(surface: Surface, centres: list[Array], spacing: float) -> Array:
         high, low = (surface.distance(*(c + side * s for c, s in zip(centres, step))) for side in (1.0, -1.0))
         slope[d] = high - low
     x, y, z = slope
-    normal: Array = slope / np.sqrt(np.maximum(x * x + y * y + z * z, 1e-300))
+    length = np.sqrt(x * x + y * y + z * z)
+    slope[2, length == 0.0] = length[length == 0.0] = 1.0  # on the axis and far from all walls any direction does
+    normal: Array = slope / length
     return normal
 
 

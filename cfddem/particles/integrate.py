@@ -98,7 +98,7 @@ def wall_contact(k, system, step):
 def contacts_of_pairs(system, step):
     """Contacts of all pairs of particles: where few of a piece touch, of those that do, or did at the last step."""
     pairs, packed, wait = may_touch(system.edges), system.packed, system.packed.wait
-    room, pieces = len(packed.row) // CHUNKS, len(wait)
+    room, pieces = len(packed.row) // CHUNKS, -(-pairs // PIECE)
     for chunk in prange(CHUNKS):
         to = chunk * room
         for piece in range(chunk * pieces // CHUNKS, (chunk + 1) * pieces // CHUNKS):

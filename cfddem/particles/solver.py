@@ -93,7 +93,7 @@ class ParticleSolver:
 
     particles  :func:`cfddem.particles.state.make_particles`
     table    pair table, :func:`cfddem.particles.material_pairs.pair_table`
-    walls    :class:`cfddem.particles.walls.shapes.Plane`, `Box`, `Cylinder`, `Cone`, `Mesh`
+    walls    :class:`cfddem.particles.walls.shapes.Plane`, `Box`, `Cylinder`, `Cone`, and `meshes.Mesh`
     laws     laws between two particles and between particles and walls
     gravity  [m/s2]
     box      length of the periodic box, which begins at 0; None along open axes [m]

@@ -44,7 +44,7 @@ class System(NamedTuple):
     table: np.ndarray  # of pairs of materials
     parameters: Parameters
     film_counts: np.ndarray  # steps in which films were solved together, iterations, passes and films of these
-    packed: Any = ()  # room for pairs whose contacts are renewed, `cfddem.particles.interactions.pair_loops.Packed`
+    packed: Any = ()  # room for pairs whose contacts are renewed, `PackedFields.room`
 
 
 class PairSystem(NamedTuple):

@@ -194,11 +194,12 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     if case.vessel and case.vessel.shape == "surface":
         reason = "the vessel is a surface from a file"
         yield Issue("error", "laws.wall_drag", reason, 'set laws.wall_drag = "none"')
-    elif case.has_fluid and (case.column.shape == "cylinder" or any(case.closes_cells(wall) for wall in case.wall)):
+    in_cells = case.column.shape == "cylinder" or case.thin_walls or any(case.closes_cells(wall) for wall in case.wall)
+    if case.has_fluid and in_cells and not (case.vessel and case.vessel.shape == "surface"):
         yield Issue(
             "warning", "laws.wall_drag",
-            "beside a round column or a wall with solid cells the grid slows the flow, too: a single sphere there has "
-            "up to 8 % too much drag",
+            "beside a round column, a thin wall or a wall with solid cells the grid slows the flow, too: a single "
+            "sphere there has up to 8 % too much drag",
             'allow for it in comparisons, or set laws.wall_drag = "none"',
         )  # fmt: skip
     column = case.column

@@ -271,7 +271,7 @@ TAKEN = {
         *RECORD_FIELDS,
     )
 }
-TAKEN |= {field.name for field in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields)
+TAKEN |= {field.name for field in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields) | {"row", "wait"}
 """Names of the built-in fields of pairs."""
 
 

@@ -118,7 +118,7 @@ class Wall:
 
         errors  InputError if a file cannot be read
         """
-        raise InputError("shape", type(self).__name__, "one of triangles")
+        raise InputError("shape", type(self).__name__, "one of triangles", "write its method `corners`")
 
     @property
     def encloses(self) -> bool:
