@@ -26,7 +26,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import BLUE, GREEN, ORANGE, label, legend, line_styles, panels, save
-from scenarios.beds.defluidisation.study import layers, onset
+from scenarios.beds.defluidisation.study import onset
 from scenarios.beds.gas_bed.study import mueller
 from scenarios.validation.kept_runs import advanced, taken
 from scenarios.validation.table import Progress, Row
@@ -83,8 +83,8 @@ class Means(NamedTuple):
 
 
 def state(name: str) -> Case:
-    """Mueller's bed in one of the states of `RAMPS`."""
-    oil, case = RAMPS[name], mueller()
+    """Mueller's bed with smeared surfaces, in one of the states of `RAMPS`."""
+    oil, case = RAMPS[name], mueller().with_(**{"laws.surface": "smeared"})
     title = f"Mueller's bed, {name}"
     if oil is None:
         return case.with_(title=title)
@@ -336,7 +336,7 @@ def falling(name: str, folder: Path) -> Ramp:
     velocity = np.interp(time, *np.array(RAMP).T)
     share = drop * case.column.floor_area / buoyant_weight(case)
     try:
-        return Ramp(time, velocity, share, onset(case, run.history, layers(run), rising=False).velocity)
+        return Ramp(time, velocity, share, onset(case, run.history, rising=False).velocity)
     except InputError as missing:
         return Ramp(time, velocity, share, math.nan, str(missing))
 
