@@ -51,11 +51,11 @@ class WallsOfCells:
         distance = np.maximum(contents(whole.walls, whole.spacing, *centres)[1], 0.0)
         normal = _normals(whole.walls, centres, min(whole.spacing))
         towards, along = np.zeros((2, MODES, distance.size))
-        for axis in range(3):
-            if whole.cells[axis] == 1:
-                continue
+        axes = [axis for axis in range(3) if whole.cells[axis] > 1]
+        sloped = normal.any(axis=0)  # not on the axis of a vessel, nor far from all walls
+        for axis in axes:
             roots = _roots(distance / whole.spacing[axis], flow_beside(axis, False, *lattice))
-            weight = normal[axis] ** 2
+            weight = np.where(sloped, normal[axis] ** 2, 1.0 / len(axes))
             towards += weight * roots[:, axis]
             along += weight * 0.5 * (roots.sum(axis=1) - roots[:, axis])  # local: three components
         fields = np.concatenate([towards, along, normal]).reshape(-1, *whole.shape)
@@ -96,16 +96,14 @@ class SolidsOfCells:
 
 
 def _normals(surface: Surface, centres: list[Array], spacing: float) -> Array:
-    """Normals of the wall, into the fluid, at points x, y, z of one shape (3, n)."""
+    """Normals of the wall, into the fluid, at points x, y, z of one shape (3, n); 0 where the distance has no slope."""
     slope = np.empty((3, centres[0].size))
     for d in range(3):
         step = [1e-3 * spacing * (d == e) for e in range(3)]
         high, low = (surface.distance(*(c + side * s for c, s in zip(centres, step))) for side in (1.0, -1.0))
         slope[d] = high - low
     x, y, z = slope
-    length = np.sqrt(x * x + y * y + z * z)
-    slope[2, length == 0.0] = length[length == 0.0] = 1.0  # on the axis and far from all walls any direction does
-    normal: Array = slope / length
+    normal: Array = slope / np.sqrt(np.maximum(x * x + y * y + z * z, 1e-300))
     return normal
 
 

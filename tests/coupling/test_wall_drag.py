@@ -236,6 +236,15 @@ def test_cells_beside_a_smooth_wall_leave_what_a_side_leaves_at_their_distance()
     assert (straight[longest] < slanting[longest]).all() and (slanting[:, 0, :2] < straight[:, 1, :2]).all()
 
 
+def test_a_wall_leaves_flow_on_the_axis_where_its_distance_has_no_slope() -> None:
+    """An odd number of cells across: the differences of the distance cancel in those on the axis."""
+    grid = within(Grid((13, 13, 4), (0.1,) * 3), cylinder((0.65, 0.65, 0.0), 0.6))
+    walls = WallsOfCells(FilterKernel(grid, (False, False, True), smoothing=0.1))
+    flow = np.tile(np.eye(3), (MODES, 1, 1)).swapaxes(0, 1)
+    left = walls.left(np.full((3, 3), 0.65) * (1.0, 1.0, 0.23), flow)
+    assert (np.einsum("pmd,pmd->pm", left, flow)[:, :2] > 0.5).all()
+
+
 @pytest.mark.parametrize(("smoothing", "within_share"), [(0.0, 1e-9), (0.08, 0.01)])
 def test_solids_that_a_sphere_gathers_of_its_own_beside_a_round_wall(smoothing: float, within_share: float) -> None:
     """Against the deposit of each alone; the control has no walls, and misses up to half of it."""
