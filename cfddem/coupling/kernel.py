@@ -330,7 +330,7 @@ class FilterKernel:
     def layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
-        fields = self._merged.average(np.array(fields, float, order="C")) if self.grid.walls else fields
+        fields = self._merged.equalise(np.array(fields, float, order="C")) if self.grid.walls else fields
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
@@ -349,9 +349,9 @@ class FilterKernel:
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
         if sweeps == 0:
-            return self._merged.average(np.array(fields, float, order="C"))
+            return self._merged.equalise(np.array(fields, float, order="C"))
         (now, inside), (other, inside_other) = self._scratch(len(fields))
-        inside[:] = fields = self._merged.average(np.array(fields, float, order="C"))
+        inside[:] = fields = self._merged.equalise(np.array(fields, float, order="C"))
         low, high = planes = self._planes(fields, sweeps)
         other[:, :low] = other[:, high + 1 :] = 0.0
         for _ in range(sweeps):
@@ -365,7 +365,7 @@ class FilterKernel:
         count = self.grid.shape[0]
         if self.periodic[2] or self.grid.communicator.size > 1:
             return 1, count
-        taken = np.flatnonzero(fields.any(axis=(0, 2, 3))) + 1
+        taken = np.flatnonzero(fields.any(axis=(0, 2, 3))) + 1  # local: of one process
         return (max(int(taken[0]) - sweeps, 1), min(int(taken[-1]) + sweeps, count)) if len(taken) else (1, 0)
 
     def _scratch(self, count: int) -> list[tuple[Array, Array]]:

@@ -35,7 +35,7 @@ class SingleCells:
         """Deposits (m, nz, ny, nx), made deposits over the open share of their groups, in all cells of these."""
         return deposits
 
-    def average(self, fields: Array) -> Array:
+    def equalise(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx), made their means over the groups, in all cells of these."""
         return fields
 
@@ -67,8 +67,8 @@ class MergedCells(SingleCells):
         """See `SingleCells.share`."""
         return self._put(deposits, self._groups.copied(self._taken(deposits)) / self._total)
 
-    def average(self, fields: Array) -> Array:
-        """See `SingleCells.average`."""
+    def equalise(self, fields: Array) -> Array:
+        """See `SingleCells.equalise`."""
         return self._put(fields, self._groups.summed(self._taken(fields) * self._open) / self._total)
 
     def copy(self, fields: Array) -> Array:

@@ -52,7 +52,7 @@ class WallsOfCells:
         normal = _normals(whole.walls, centres, min(whole.spacing))
         towards, along = np.zeros((2, MODES, distance.size))
         axes = [axis for axis in range(3) if whole.cells[axis] > 1]
-        sloped = normal.any(axis=0)  # not on the axis of a vessel, nor far from all walls
+        sloped = normal.any(axis=0)  # local: three components; not on the axis of a vessel, nor far from walls
         for axis in axes:
             roots = _roots(distance / whole.spacing[axis], flow_beside(axis, False, *lattice))
             weight = np.where(sloped, normal[axis] ** 2, 1.0 / len(axes))
