@@ -181,12 +181,13 @@ class Coupling:
 
     def _terms(self, particles: Particles, cell_map: ParticleCellMap, step: float) -> CouplingTerms:
         """Terms of a step with the flow around every particle, before any force has acted."""
-        solid, carried = self.flow.deposited(particles, cell_map)
+        cells = self.flow.deposited(particles, cell_map)
+        solid = cells.solid
         terms = CouplingTerms(particles, step, self.momentum.last_step, cell_map, solid)
         # forces act over the step: they see the mean of the solid fractions at its beginning and its end
         first = self.momentum.last_step == 0.0
         mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
-        terms.flow = self.flow.sample(particles, cell_map, solid, mean, carried)
+        terms.flow = self.flow.sample(particles, cell_map, cells, mean)
         terms.seen_solids = self.flow.seen_solids
         return terms
 

@@ -70,6 +70,13 @@ def nothing_of_its_own(particles: Particles, cell_map: ParticleCellMap) -> Own:
 Sampled = Callable[[Particles, ParticleCellMap], Own]
 
 
+class Deposited(NamedTuple):
+    """What particles deposit on the cells before the flow is sampled."""
+
+    solid: Array  # solid fraction (nz, ny, nx) [-]
+    momentum: Array = np.empty((0, 0, 0, 0))  # solid fraction times velocity, for sharp surfaces (3, nz, ny, nx) [m/s]
+
+
 class FlowSampler:
     """Samples the flow around particles.
 
@@ -97,25 +104,17 @@ class FlowSampler:
         own = next((force.own for force in needs if force.own is not None), nothing_of_its_own)
         return cls(fluid, kernel, own, any(force.needs_sizes for force in needs))
 
-    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array | None]:
-        """Solid fraction of the cells (nz, ny, nx), and what `sample` needs of the cells beside."""
-        return self.kernel.solid_fraction(cell_map), None
+    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> Deposited:
+        """What `sample` needs of the cells."""
+        return Deposited(self.kernel.solid_fraction(cell_map))
 
-    def sample(
-        self,
-        particles: Particles,
-        cell_map: ParticleCellMap,
-        solid: Array,
-        mean: Array | None = None,
-        carried: Array | None = None,
-    ) -> SampledFlow:
+    def sample(self, particles: Particles, cell_map: ParticleCellMap, cells: Deposited, mean: Array) -> SampledFlow:
         """The flow around every particle now.
 
-        solid    solid fraction of the cells, of the positions in `cell_map` (nz, ny, nx)
-        mean     the same in the middle of the step, which particles see; `solid` if None
-        carried  as `deposited` returns it; deposited here if None
+        cells  as deposited, of the positions in `cell_map`
+        mean   solid fraction of the cells in the middle of the step, which particles see (nz, ny, nx) [-]
         """
-        gathered = self._gathered(cell_map, solid if mean is None else mean)
+        gathered, solid = self._gathered(cell_map, mean), cells.solid
         if self.kernel.unequal:
             gathered[:, 3] *= self._seen_over_gathered(cell_map, solid)
         own = self.own(particles, cell_map)
@@ -251,31 +250,25 @@ class SharpFlowSampler(FlowSampler):
         super().__init__(fluid, kernel, own, sizes)
         self.seen_solids = SeenSolids(kernel)
 
-    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
-        """Solid fraction of the cells, and solid fraction times velocity of the particles (3, nz, ny, nx) [m/s]."""
+    def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> Deposited:
+        """See `FlowSampler.deposited`; both in one pass."""
         kernel, volume = self.kernel, cell_map.volume[:, None]
         cell = kernel.grid.cell_volume
         fields = kernel.spread(
             cell_map, np.hstack([volume, volume * particles.velocity]), np.array([1.0, cell, cell, cell])
         )
-        return fields[0] / cell, fields[1:]
+        return Deposited(fields[0] / cell, fields[1:])
 
-    def sample(
-        self,
-        particles: Particles,
-        cell_map: ParticleCellMap,
-        solid: Array,
-        mean: Array | None = None,
-        carried: Array | None = None,
-    ) -> SampledFlow:
+    def sample(self, particles: Particles, cell_map: ParticleCellMap, cells: Deposited, mean: Array) -> SampledFlow:
         """See `FlowSampler.sample`."""
         assert self.seen_solids is not None
-        if carried is None:
-            _, carried = self.deposited(particles, cell_map)
         solids = _Solids(self.seen_solids.around(cell_map), self.seen_solids.change, particles[SEEN.name])
-        gathered = self._means(cell_map, solid if mean is None else mean, carried)
+        gathered = self._means(cell_map, mean, cells.momentum)
         own = self.own(particles, cell_map)
-        (slip, unseen), ratio = np.empty((2, particles.count, 3)), self._diameter_ratio(particles, cell_map, solid)
+        (slip, unseen), ratio = (
+            np.empty((2, particles.count, 3)),
+            self._diameter_ratio(particles, cell_map, cells.solid),
+        )
         voidage, reynolds, others, narrowing, of_others, company = np.empty((6, particles.count))
         flow = SampledFlow(slip, unseen, voidage, reynolds, others, ratio, narrowing, of_others, company)
         spheres = _Spheres(cell_map.volume, particles.radius, particles.velocity, particles.viscosity)
@@ -286,11 +279,11 @@ class SharpFlowSampler(FlowSampler):
         """Store the solid fraction seen at the end of the step."""
         particles[SEEN.name][:] = flow.solid
 
-    def _means(self, cell_map: ParticleCellMap, solid: Array, carried: Array) -> Array:
+    def _means(self, cell_map: ParticleCellMap, solid: Array, momentum: Array) -> Array:
         """Means of the cells around every particle: velocity of the fluid, solid fraction, solid fraction times
         velocity of the fluid, and of the particles (N, 10) [m/s], [-], [m/s], [m/s]."""
         velocity = np.moveaxis(self.fluid.velocity, -1, 0)
-        fields = np.concatenate([velocity, solid[None], solid * velocity, carried])
+        fields = np.concatenate([velocity, solid[None], solid * velocity, momentum])
         return self.kernel.sample(cell_map.stencil, cell_map.radius, fields)
 
 

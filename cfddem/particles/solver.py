@@ -115,8 +115,8 @@ class ParticleSolver:
         settings: SolverSettings = SolverSettings(),
         sharing: Sharing = Sharing(),
     ) -> None:
-        self.table, communicator, record = table, sharing.communicator, settings.record
-        self.communicator = communicator
+        self.table, record = table, settings.record
+        self.communicator = communicator = sharing.communicator
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()

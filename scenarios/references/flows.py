@@ -157,22 +157,23 @@ def fixed_bed(model: str, speed: float, cells: tuple[int, ...]) -> float:
     return float(fluid.pressure[0].mean()) / float(gradient[:, 0, 0].sum() * h)
 
 
-def water_at_rest(model: str) -> float:
-    """Largest velocity in water that stands over a steep and random voidage, over sqrt(g H)."""
+def still_water(model: str) -> tuple[FluidSolver, Array]:
+    """Water over a steep and random voidage, 0.4 or 1, and a resistance where it is 0.4 (nz, ny, nx) [kg/m3/s]."""
     grid = Grid((4, 4, 32), (0.01, 0.01, 0.01))
     voidage = np.where(np.random.default_rng(0).random(grid.shape) < 0.5, 0.4, 1.0)
     fluid = FluidSolver(
-        grid,
-        {"z_high": Outlet()},
-        density=1000.0,
-        viscosity=1e-3,
-        gravity=(0, 0, -9.81),
-        voidage=voidage,
+        grid, {"z_high": Outlet()}, density=1000.0, viscosity=1e-3, gravity=(0.0, 0.0, -9.81), voidage=voidage,
         scheme=Scheme(model=model),
-    )
+    )  # fmt: skip
+    return fluid, np.where(voidage < 1, 1e5, 0.0)
+
+
+def water_at_rest(model: str) -> float:
+    """Largest velocity in water that stands over a steep and random voidage, over sqrt(g H)."""
+    fluid, resistance = still_water(model)
     for _ in range(5):
-        fluid.step(1e-3, None, np.where(voidage < 1, 1e5, 0.0))
-    return float(np.abs(fluid.velocity).max() / np.sqrt(9.81 * grid.size[2]))
+        fluid.step(1e-3, None, resistance)
+    return float(np.abs(fluid.velocity).max() / np.sqrt(9.81 * fluid.grid.size[2]))
 
 
 # ---------------------------------------------------------------- a manufactured solution

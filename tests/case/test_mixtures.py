@@ -172,8 +172,8 @@ def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
     particles, coupling = parts.particle_solver.particles, parts.coupling
     assert coupling is not None
     place = coupling.kernel.map_particles(particles.position, particles.radius)
-    solid = coupling.kernel.solid_fraction(place)
-    flow = coupling.flow.sample(particles, place, solid)
+    cells = coupling.flow.deposited(particles, place)
+    flow = coupling.flow.sample(particles, place, cells, cells.solid)
     ratio = flow.diameter_ratio
     sauter = (particles.radius**3).sum() / (particles.radius**2).sum() * 2.0
     for diameter in (1e-3, 2e-3):

@@ -9,7 +9,7 @@ from cfddem.fluid import budgets
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver, Scheme
-from scenarios.references.flows import ALL_PERIODIC, fixed_bed
+from scenarios.references.flows import ALL_PERIODIC, fixed_bed, still_water
 
 ALL_WALLS = dict.fromkeys(SIDES, NoSlip())
 
@@ -212,19 +212,8 @@ def test_models_a_and_b_give_the_single_phase_flow_in_a_uniform_voidage(voidage)
 def test_a_fluid_at_rest_stays_at_rest_at_a_voidage_jump(model):
     """Water, voidage 0.4 to 1 in one cell, particles at rest, a wrong pressure to begin with:
     below 1e-10 sqrt(g H)."""
-    grid = Grid((4, 4, 32), (0.01, 0.01, 0.01))
-    rng = np.random.default_rng(0)
-    voidage = np.where(rng.random(grid.shape) < 0.5, 0.4, 1.0)
-    fluid = FluidSolver(
-        grid,
-        {"z_high": Outlet()},
-        density=1000.0,
-        viscosity=1e-3,
-        gravity=(0, 0, -9.81),
-        voidage=voidage,
-        scheme=Scheme(model=model),
-    )
-    beta = np.where(voidage < 1, 1e5, 0.0)
+    fluid, beta = still_water(model)
+    grid = fluid.grid
     limit = 1e-10 * np.sqrt(9.81 * 0.32)
     for _ in range(5):
         fluid.step(1e-3, None, beta)

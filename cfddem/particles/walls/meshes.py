@@ -25,14 +25,17 @@ class Triangles(Wall):
     exact = False
 
     def for_particles(self) -> Wall:
+        """See `Wall.for_particles`."""
         return Mesh.of_corners(
             self.corners(), velocity=self.velocity, spin=self.spin, centre=self.centre, material=self.material
         )
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         return self.corners().reshape(-1, 3), 0.0
 
     def middle(self) -> np.ndarray:
+        """See `Wall.middle`."""
         if self.centre is not None:
             return np.array(self.centre, float)
         points, _ = self.frame()
@@ -62,9 +65,11 @@ class Plate(Triangles):
 
     @property
     def side(self) -> Solid:
+        """See `Wall.side`."""
         return Solid("thin", ("thin", "none"), "a plate has no inside")
 
     def corners(self) -> Array:
+        """See `Wall.corners`."""
         first, second = np.array(self.edges)
         quad = np.array(self.point) + np.array([0.0 * first, first, first + second, second])
         return np.asarray(quad[[[0, 1, 2], [0, 2, 3]]])
@@ -84,10 +89,12 @@ class Surface(Triangles):
     point: Vector = (0.0, 0.0, 0.0)
 
     def corners(self) -> Array:
+        """See `Wall.corners`."""
         return np.asarray(np.array(self.point) + self.scale * kept_surface(self.file, stamp(self)))
 
     @property
     def encloses(self) -> bool:
+        """See `Wall.encloses`."""
         return is_closed_surface(self.file, stamp(self))
 
 
@@ -154,12 +161,15 @@ class Mesh(Triangles):
         return [(TRIANGLE, [*abc, *n]) for abc, n in zip(corners.reshape(-1, 9), normal)]
 
     def for_particles(self) -> Wall:
+        """See `Wall.for_particles`."""
         return self
 
     def corners(self) -> Array:
+        """See `Wall.corners`."""
         return np.asarray(self.vertices[self.triangles])
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         return self.vertices, 0.0
 
     def sweep(self) -> float:

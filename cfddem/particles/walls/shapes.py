@@ -46,9 +46,11 @@ class Plane(Wall):
         return [(PLANE, [*self.point, *unit(self.normal)])]
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         return np.array([self.point], float), np.inf
 
     def repeats(self, periodic: np.ndarray) -> bool:
+        """See `Wall.repeats`."""
         return not np.asarray(self.normal)[periodic].any()
 
     def sweep(self) -> float:
@@ -64,9 +66,11 @@ class Plane(Wall):
 
     @property
     def side(self) -> Solid:
+        """See `Wall.side`."""
         return BEHIND
 
     def misplaced(self, column: Array) -> Iterator[tuple[Literal["warning", "error"], str, str, str]]:
+        """See `Wall.misplaced`."""
         away = self.distance(corners_of(np.zeros(3), column))
         if away.max() <= 0.0:
             yield "error", "normal", "the whole column lies behind the plane", "reverse the normal"
@@ -74,15 +78,19 @@ class Plane(Wall):
             yield "warning", "point", "the plane does not cut the column", "move it into the column"
 
     def distance(self, points: Array) -> Array:
+        """See `Wall.distance`."""
         return np.asarray((points - np.array(self.point)) @ unit(self.normal))
 
     def speed_of_spin(self) -> float:
+        """See `Wall.speed_of_spin`."""
         return 0.0
 
     def polygons(self, far: float) -> list[Array]:
+        """See `Wall.polygons`."""
         return [np.array(self.point) + math.sqrt(0.5) * far * circle(unit(self.normal), 4)[None]]
 
     def sketch(self, far: float) -> Sketch:
+        """See `Wall.sketch`."""
         along = np.array([-self.normal[2], self.normal[0]])
         reach = far * along / max(math.hypot(*along), 1e-300)
         return Sketch([np.array(self.point)[::2] + np.array([-reach, reach])] if along.any() else [], [])
@@ -114,6 +122,7 @@ class Box(Wall):
         return [(PLANE, [*corner, *(sign * n)]) for corner, sign in ((self.low, 1), (self.high, -1)) for n in axes]
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         return corners_of(np.array(self.low), np.array(self.high)), 0.0
 
 
@@ -153,9 +162,11 @@ class Tapered(Round):
 
     @property
     def side(self) -> Solid:
+        """See `Wall.side`."""
         return Solid(None)
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         return np.array([self.point, np.add(self.point, (self.length or 0.0) * unit(self.axis))]), max(self.radii)
 
     def _ring(self, end: float, radius: float, count: int) -> Array:
@@ -164,11 +175,13 @@ class Tapered(Round):
         return np.asarray(np.array(self.point) + end * axis + radius * circle(axis, count))
 
     def corners(self) -> Array:
+        """See `Wall.corners`."""
         low, high = self._ring(0.0, self.radii[0], SIDES), self._ring(self.length or 0.0, self.radii[1], SIDES)
         after = [np.roll(corner, -1, axis=0) for corner in (low, high)]
         return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
 
     def extent(self) -> Array | None:
+        """See `Wall.extent`."""
         if self.length is None:
             return None
         axis = unit(self.axis)
@@ -191,6 +204,7 @@ class Tapered(Round):
         return np.hypot(radius - own - along * slope, height - along * length)
 
     def closes(self, points: Array, side: str | None = None) -> NDArray[np.bool_]:
+        """See `Wall.closes`."""
         if not self.is_open:
             return super().closes(points)
         height, radius = self._about_axis(points)
@@ -200,6 +214,7 @@ class Tapered(Round):
         return np.asarray(beside & ((radius > there) if side == "outside" else (radius < there)))
 
     def speed_of_spin(self) -> float:
+        """See `Wall.speed_of_spin`."""
         reach, arm = max(self.radii), 0.0
         if not self._spins_along(self.axis, self.point):
             reach += self.length or 0.0
@@ -208,10 +223,12 @@ class Tapered(Round):
 
     @property
     def opening(self) -> tuple[str, float] | None:
+        """See `Wall.opening`."""
         own, top = self.radii
         return ("radius" if own <= top else "top_radius", 2.0 * min(own, top)) if self.is_open else None
 
     def circle_half_way_up(self) -> tuple[float, float, float] | None:
+        """See `Wall.circle_half_way_up`."""
         upright = self.is_open and self.axis[:2] == (0.0, 0.0)
         return (*self.point[:2], 0.5 * sum(self.radii)) if upright else None
 
@@ -219,11 +236,13 @@ class Tapered(Round):
         return (-far, far) if self.length is None else (0.0, self.length)
 
     def polygons(self, far: float) -> list[Array]:
+        """See `Wall.polygons`."""
         low, high = (self._ring(end, radius, AROUND) for end, radius in zip(self._ends(far), self.radii))
         side = np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1)
         return [side, np.stack([low, high])] if self.caps else [side]
 
     def sketch(self, far: float) -> Sketch:
+        """See `Wall.sketch`."""
         axis, point = unit(self.axis)[::2], np.array(self.point)[::2]
         if math.hypot(*axis) < 0.5 and self.length is not None:
             angle = np.linspace(0.0, 2.0 * math.pi, 100)
@@ -264,9 +283,11 @@ class Cylinder(Tapered):
 
     @property
     def side(self) -> Solid:
+        """See `Wall.side`."""
         return BEHIND if self.length is None or self.caps else Solid(None)
 
     def distance(self, points: Array) -> Array:
+        """See `Wall.distance`."""
         if self.is_open:
             return super().distance(points)
         height, radius = self._about_axis(points)
@@ -294,6 +315,7 @@ class Cylinder(Tapered):
         return [side, (PLANE, [*self.point, *axis]), (PLANE, [*top, *-axis])]
 
     def repeats(self, periodic: np.ndarray) -> bool:
+        """See `Wall.repeats`."""
         across = np.asarray(self.axis)[~periodic].any()
         return self.length is None and not across and int(periodic.sum()) == 1
 
@@ -338,6 +360,7 @@ class Cone(Tapered):
 
     @property
     def radii(self) -> tuple[float, float]:
+        """See `Tapered.radii`."""
         return self.radius, self.top_radius
 
 
@@ -382,6 +405,7 @@ class Turned(Round):
         return pieces
 
     def frame(self) -> tuple[np.ndarray, float]:
+        """See `Wall.frame`."""
         points, axis = np.asarray(self.line, float), unit(self.axis)
         return np.array([np.add(self.point, z * axis) for z in points[:, 0]]), float(points[:, 1].max())
 
