@@ -91,7 +91,7 @@ def sort_into_slabs(position, origin, inverse, thickness, order, start):
 
 
 @inline
-def _weight(corner, a, b, c):
+def weight(corner, a, b, c):
     """Weight of one of the eight cells that a piece touches."""
     up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
     return (c if up else 1.0 - c) * ((b if back else 1.0 - b) * (a if right else 1.0 - a))
@@ -111,8 +111,8 @@ def _weights(n, s, shares):
     """Weights of the cells of piece s of particle n."""
     a, b, c = shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
     return (
-        _weight(0, a, b, c), _weight(1, a, b, c), _weight(2, a, b, c), _weight(3, a, b, c),
-        _weight(4, a, b, c), _weight(5, a, b, c), _weight(6, a, b, c), _weight(7, a, b, c),
+        weight(0, a, b, c), weight(1, a, b, c), weight(2, a, b, c), weight(3, a, b, c),
+        weight(4, a, b, c), weight(5, a, b, c), weight(6, a, b, c), weight(7, a, b, c),
     )  # fmt: skip
 
 
@@ -173,7 +173,7 @@ def _deposit_rows(rows, values, unit, first, shares, corners, fields):
             for m in range(values.shape[1]):
                 part = values[n, m] * unit[m] / first.shape[1]
                 for corner in range(CORNERS):
-                    fields[cell + corners[corner], m] += np.int64(np.rint(_weight(corner, a, b, c) * part))
+                    fields[cell + corners[corner], m] += np.int64(np.rint(weight(corner, a, b, c) * part))
 
 
 @threaded

@@ -22,6 +22,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.kernel_loops import weight
 from cfddem.coupling.self_disturbance_tables import MODES, lattice_of
 from cfddem.coupling.self_disturbance_walls import PLACES, flow_beside
 from cfddem.fluid.cut_cells import contents
@@ -143,13 +144,6 @@ def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
 
 
 @inline
-def _weight(corner, a, b, c):
-    """Of one of the eight cells on which a particle deposits, counted along x first."""
-    x, y, z = corner & 1, corner >> 1 & 1, corner >> 2
-    return (a if x else 1.0 - a) * (b if y else 1.0 - b) * (c if z else 1.0 - c)
-
-
-@inline
 def _step(here, there):
     """From a number of cells to another one: -1, 0 or 1; over a periodic side the other way round."""
     apart = there - here
@@ -172,5 +166,5 @@ def _pairs(stencil, corners, around, volume, own):
             for j in range(8):
                 there = around[first + corners[j]]
                 x, y, z = _step(here[0], there[0]), _step(here[1], there[1]), _step(here[2], there[2])
-                total += _weight(i, a, b, c) * _weight(j, a, b, c) * here[3 + 9 * (z + 1) + 3 * (y + 1) + x + 1]
+                total += weight(i, a, b, c) * weight(j, a, b, c) * here[3 + 9 * (z + 1) + 3 * (y + 1) + x + 1]
         own[n] = volume[n] * total

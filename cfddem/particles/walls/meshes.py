@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.backend.errors import InputError, shown
 from cfddem.model.triangles import Array
 from cfddem.particles.walls.stl import is_closed_surface, kept_surface, read_surface, stamp, write_stl
-from cfddem.particles.walls.wall import ROUNDING, Solid, Wall
+from cfddem.particles.walls.wall import ROUNDING, SolidSide, Wall
 
 if TYPE_CHECKING:
     from cfddem.particles.vectors import Vector
@@ -64,9 +64,9 @@ class Plate(Triangles):
         super().__post_init__()
 
     @property
-    def side(self) -> Solid:
+    def side(self) -> SolidSide:
         """See `Wall.side`."""
-        return Solid("thin", ("thin", "none"), "a plate has no inside")
+        return SolidSide("thin", ("thin", "none"), "a plate has no inside")
 
     def corners(self) -> Array:
         """See `Wall.corners`."""

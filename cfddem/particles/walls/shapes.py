@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.model.triangles import Array, circle, corners_of
-from cfddem.particles.walls.wall import Sketch, Solid, Wall, unit
+from cfddem.particles.walls.wall import Sketch, SolidSide, Wall, unit
 
 if TYPE_CHECKING:
     from cfddem.particles.vectors import Vector
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SIDES, AROUND = 96, 72
 """Sides of an open cylinder or cone as a thin wall of the fluid, and of a round wall in a picture."""
 
-BEHIND = Solid("behind", ("none",), "the side without particles is solid")
+BEHIND = SolidSide("behind", ("none",), "the side without particles is solid")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,7 @@ class Plane(Wall):
         return abs(float(np.dot(self.velocity, unit(self.normal))))
 
     @property
-    def side(self) -> Solid:
+    def side(self) -> SolidSide:
         """See `Wall.side`."""
         return BEHIND
 
@@ -161,9 +161,9 @@ class Tapered(Round):
         return self.radius, self.radius
 
     @property
-    def side(self) -> Solid:
+    def side(self) -> SolidSide:
         """See `Wall.side`."""
-        return Solid(None)
+        return SolidSide(None)
 
     def frame(self) -> tuple[np.ndarray, float]:
         """See `Wall.frame`."""
@@ -282,9 +282,9 @@ class Cylinder(Tapered):
         super().__post_init__()
 
     @property
-    def side(self) -> Solid:
+    def side(self) -> SolidSide:
         """See `Wall.side`."""
-        return BEHIND if self.length is None or self.caps else Solid(None)
+        return BEHIND if self.length is None or self.caps else SolidSide(None)
 
     def distance(self, points: Array) -> Array:
         """See `Wall.distance`."""

@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 """Relative difference below which directions and positions are equal."""
 
 
-class Solid(NamedTuple):
+class SolidSide(NamedTuple):
     """Side of a wall whose cells are solid to a fluid.
 
     default  where a case says nothing: "behind", "inside" or "thin"; None if the case has to say it
@@ -104,9 +104,9 @@ class Wall:
         return self
 
     @property
-    def side(self) -> Solid:
+    def side(self) -> SolidSide:
         """Side whose cells are solid to a fluid."""
-        return Solid("inside")
+        return SolidSide("inside")
 
     @property
     def is_open(self) -> bool:
