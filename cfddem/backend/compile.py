@@ -69,6 +69,7 @@ __all__ = [
     "serial",
     "threaded",
     "threaded_part",
+    "use_gpu",
     "use_threads",
     "vector_inline",
     "vector_part",
@@ -247,6 +248,20 @@ def use_threads(count: int | None) -> int:
         except ValueError as refusal:
             raise InputError("threads", count, f"1 to {_most_threads()} on this machine") from refusal
     return int(get_num_threads())
+
+
+_GPU = [False]
+
+
+def use_gpu(choice: bool | None) -> bool:
+    """Let particle solvers that are made from now on make their steps on a graphics processor, or not.
+
+    choice   None: leave as it is
+    returns  what holds now
+    """
+    if choice is not None:
+        _GPU[0] = choice
+    return _GPU[0]
 
 
 def _most_threads() -> int:

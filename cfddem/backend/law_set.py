@@ -54,25 +54,36 @@ class Slot:
         raise TypeError(f"{self.name} is a slot for a law; call the loop that specialise() returns")
 
 
-def specialise(template: Any, choices: Mapping[str, Any], threads: bool = False) -> Any:
+def specialise(
+    template: Any, choices: Mapping[str, Any], threads: bool = False, way: Callable[[Any], Any] | None = None
+) -> Any:
     """The loop of a template for chosen laws; equal choices give the same loop.
 
     template  compiled by `inline`, `serial`, `threaded` or `either`
     choices   slot name -> function compiled by `inline`, template, or constant
     threads   compile loops marked `either` for all threads
+    way       mark of a function -> how it is compiled, for another processor
     """
-    return _Specialiser(choices, threads).of(template)
+    return _Specialiser(choices, way or (_on_all_threads if threads else _as_marked)).of(template)
 
 
 _COPIES: dict[tuple[Any, str], Any] = {}
 _ON_ALL_THREADS = {either: threaded, part: threaded_part, vector_part: threaded_part}
 
 
+def _as_marked(mark: Any) -> Any:
+    return mark
+
+
+def _on_all_threads(mark: Any) -> Any:
+    return _ON_ALL_THREADS.get(mark, mark)
+
+
 class _Specialiser:
     """Copies the functions of one template; each once."""
 
-    def __init__(self, choices: Mapping[str, Any], threads: bool) -> None:
-        self.choices, self.threads = choices, threads
+    def __init__(self, choices: Mapping[str, Any], way: Callable[[Any], Any]) -> None:
+        self.choices, self.way = choices, way
         self._done: dict[int, Any] = {}
 
     def of(self, template: Any) -> Any:
@@ -91,12 +102,11 @@ class _Specialiser:
             if isinstance(value, Slot):
                 value = self.choices.get(value.name, value)  # empty slots are behind an `if` that is not compiled
                 bound[name] = self.of(value) if _is_compiled(value) else value
-            elif _is_compiled(value) and (copy := self.of(value)) is not value:
+            elif (_is_compiled(value) or self._is_called(value)) and (copy := self.of(value)) is not value:
                 bound[name] = copy
-        how = template.compiled_as
-        if self.threads:
-            how = _ON_ALL_THREADS.get(how, how)
-        if not bound and how is template.compiled_as:
+        mark = getattr(template, "compiled_as", inline)
+        how = self.way(mark)
+        if not bound and how is mark:
             return template
         tag = _digest([how.__name__, *(f"{name}={fingerprint(bound[name])}" for name in sorted(bound))])
         if (plain, tag) not in _COPIES:
@@ -104,6 +114,10 @@ class _Specialiser:
             copy.tag = tag
             _COPIES[plain, tag] = copy
         return _COPIES[plain, tag]
+
+    def _is_called(self, value: Any) -> bool:
+        """Whether a plain function is a law that loops call by its name, and that this processor needs a copy of."""
+        return self.way(inline) is not inline and isinstance(value, FunctionType) and is_exposed(value)
 
 
 def callable_in_loops(law: Callable[..., Any]) -> Any:

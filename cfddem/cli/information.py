@@ -153,6 +153,7 @@ def examine(quick: bool = False) -> Iterator[Answer]:
     packages = about["dependencies"]
     yield Answer("packages", bool(packages), ", ".join(f"{name} {version}" for name, version in packages.items()))
     yield _threads()
+    yield _gpu()
     yield _compiled_loops()
     yield from _law_packages()
     yield _disk(Path())
@@ -166,6 +167,16 @@ def _threads() -> Answer:
     from cfddem.backend.compile import use_threads
 
     return Answer("threads", True, f"{use_threads(None)} of {os.cpu_count()} processors, {platform.machine()}")
+
+
+def _gpu() -> Answer:
+    from cfddem.backend.errors import InputError
+    from cfddem.backend.gpu import name_of_gpu
+
+    try:
+        return Answer("gpu", True, f"{name_of_gpu()}; cfddem run CASE --gpu")
+    except InputError:
+        return Answer("gpu", True, "none; for one of NVIDIA: pip install 'cfddem[gpu]'")
 
 
 def _compiled_loops() -> Answer:

@@ -74,6 +74,7 @@ def bench(
             help="dem with a liquid bridge on every contact; bed: a wet bed beside the same bed dry", negative=""
         ),
     ] = False,
+    gpu: Annotated[bool, Parameter(help="dem with its steps on a graphics processor", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
     """Measure the speed of this machine: a dense bed of spheres (dem), boxes of fluid (fluid), a gas bed (bed).
@@ -93,7 +94,10 @@ def bench(
     bed = wet_bed if bridges else gas_bed
 
     targets = {
-        "dem": (lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"), dense_bed.rows),
+        "dem": (
+            lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full", gpu=gpu),
+            dense_bed.rows,
+        ),
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
         "bed": (lambda: bed.bench(threads), bed.rows),
         "scaling": (lambda: scaling.bench(threads), scaling.rows),

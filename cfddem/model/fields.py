@@ -146,8 +146,9 @@ class Table:
             if hasattr(type(self), field.name) or field.name in ("fields", "arrays", "rows"):
                 raise InputError("Field.name", field.name, f"a name that {type(self).__name__} does not use itself")
             self.fields[field.name] = field
-            self.arrays[field.name] = field.empty(self.rows)
-            self._fill(field, values)
+            self.arrays[field.name] = np.zeros((self.rows, *field.shape), field.dtype)  # no page is touched yet
+            if values is not None or field.initial is not Field.initial:
+                self._fill(field, values)
         return self.arrays[field.name]
 
     def reset(self, *names: str) -> None:

@@ -46,6 +46,7 @@ class NeighbourLists:
 
     made       number of lists since the first
     listed_at  step of the run at which the last list was made
+    listing_cost  as `LISTING_COST`; more where steps cost less
     many       there are so many particles that loops run on all threads
     """
 
@@ -67,6 +68,7 @@ class NeighbourLists:
         self.ghosts = SingleDomain() if division is None else DividedDomain(division, communicator, balance)
         self.skin, self.sort_every, self._is_tuned = skin or 0.0, sort_every, skin is None
         self.made, self.listed_at, self.many = -1, 0, False
+        self.listing_cost = LISTING_COST
         self._mean_radius = 0.0
 
     def own(self, particles: Particles) -> Particles:
@@ -124,7 +126,7 @@ class NeighbourLists:
             age, self.listed_at = steps - self.listed_at, steps
             if self._is_tuned and age > 0:
                 room = 0.5 * min(self.box) - (2.0 + 0.5 * reach_ratio) * largest
-                self.skin = tuned(self.skin, age, self._mean_radius, room)
+                self.skin = tuned(self.skin, age, self._mean_radius, room, self.listing_cost)
         reach = pair_reach(largest, reach_ratio, self.skin)
         old_row = np.append(old_row, self.ghosts.renew(particles, reach, self.box))
         roughness = float(self.table["roughness_gap"].max())  # local: every rank has the table
@@ -179,7 +181,7 @@ def remember_earlier(edges: Edges, particles: Particles, earlier: Any, communica
     edges.recall(kept | {"bodies": bodies}, rows)
 
 
-def tuned(skin: float, age: int, radius: float, room: float) -> float:
+def tuned(skin: float, age: int, radius: float, room: float, cost: float = LISTING_COST) -> float:
     """The skin at which new lists and pairs that do not touch cost the same [m].
 
     The life of a list grows with the skin, and so does the number of pairs in it.
@@ -188,7 +190,8 @@ def tuned(skin: float, age: int, radius: float, room: float) -> float:
     age     steps for which it lasted, above 0
     radius  mean of the particles [m]
     room    widest skin that the periodic box allows [m]
+    cost    as `LISTING_COST`
     """
-    best = radius * math.sqrt(LISTING_COST * skin / (radius * age))
+    best = radius * math.sqrt(cost * skin / (radius * age))
     best = min(max(best, 0.5 * skin), 2.0 * skin)
     return min(max(best, NARROWEST * radius), WIDEST * radius, max(skin, 0.99 * room))

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import inline, serial
+from cfddem.backend.compile import get_num_threads, inline, prange, serial, threaded
 from cfddem.backend.named import named_arrays
 from cfddem.model.fields import Field, Table
 from cfddem.particles.state import Particles
@@ -101,6 +101,9 @@ class Edges(Table):
         new = np.flatnonzero(source < 0)
         for name, field in self.fields.items():
             if field.role == "scratch" or name not in old or not old.rows:
+                continue
+            if field.dtype is float:
+                _take(old[name].reshape(-1), source, max(math.prod(field.shape), 1), self[name].reshape(-1))
                 continue
             initial = self[name][new]
             np.take(old[name], source, axis=0, out=self[name], mode="wrap")  # faster than to choose the known ones
@@ -192,46 +195,67 @@ THICKEST = 0.02
 """Upper limit of the minimum gap over the reduced radius, unless asperities are larger."""
 
 
-@serial
-def _incidence(first, second, image, near, between_particles, ids):
+def _incidence(
+    first: np.ndarray, second: np.ndarray, image: np.ndarray, near: int, between_particles: int, ids: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Let the lower id of each pair be first, and list the edges of each particle by the id of the other body."""
-    count = len(ids)
-    start = np.zeros(count + 1, np.int64)
-    for k in range(len(first)):
-        start[first[k] + 1] += 1
-        if k < between_particles:
-            start[second[k] + 1] += 1
-            if ids[first[k]] > ids[second[k]]:
-                first[k], second[k] = second[k], first[k]
-                image[k] = 2 * HOME - image[k]
-    for i in range(count):
-        start[i + 1] += start[i]
-    incident, key = np.empty(start[count], np.int32), np.empty(start[count], np.int64)
-    filled = start[:-1].copy()
-    walls = len(first)
-    for begin, end, last in ((0, near, walls), (near, between_particles, between_particles)):
-        sorted_from = filled.copy()
-        for k in range(begin, end):
-            i, j = first[k], second[k]
-            _place(incident, key, sorted_from[i], filled[i], k, ids[j])
-            _place(incident, key, sorted_from[j], filled[j], -1 - k, ids[i])
-            filled[i] += 1
-            filled[j] += 1
-        for k in range(between_particles, last):  # once, before the far pairs; already by wall and triangle
-            i = first[k]
-            incident[filled[i]] = k
-            filled[i] += 1
+    count, threads = len(ids), get_num_threads()
+    # in the order of the lists: near pairs, walls, far pairs; pairs in a piece for each thread
+    close = np.linspace(0, near, threads + 1).astype(np.int64)
+    far = np.linspace(near, between_particles, (threads if near < between_particles else 0) + 1).astype(np.int64)
+    begin = np.concatenate([close[:-1], [between_particles], far[:-1]])
+    end = np.concatenate([close[1:], [len(first)], far[1:]])
+    place = np.zeros((len(begin), count + 1), np.uint32)
+    start, edges = np.zeros(count + 1, np.int64), len(first) + between_particles
+    incident, key = np.empty(edges, np.int32), np.empty(edges, np.int64)
+    _list_edges(first, second, image, ids, between_particles, begin, end, threads, place, start, incident, key)
     return start, incident
 
 
+@threaded
+def _list_edges(first, second, image, ids, between_particles, begin, end, walls, place, start, incident, key):
+    """Turn pairs, and list the edges of each particle, piece by piece of the edges; `walls` is the piece of walls."""
+    pieces, count = len(begin), len(ids)
+    for piece in prange(pieces):
+        for k in range(begin[piece], end[piece]):
+            place[piece, first[k]] += np.uint32(1)
+            if k < between_particles:
+                place[piece, second[k]] += np.uint32(1)
+                if ids[first[k]] > ids[second[k]]:
+                    first[k], second[k] = second[k], first[k]
+                    image[k] = 2 * HOME - image[k]
+    total = np.uint32(0)
+    for i in range(count):
+        start[i] = total
+        for piece in range(pieces):
+            number = place[piece, i]
+            place[piece, i] = total
+            total += number
+    start[count] = total
+    for piece in prange(pieces):
+        for k in range(begin[piece], end[piece]):
+            i = first[k]
+            incident[place[piece, i]] = k
+            if k < between_particles:
+                j = second[k]
+                key[place[piece, i]] = ids[j]
+                incident[place[piece, j]], key[place[piece, j]] = -1 - k, ids[i]
+                place[piece, j] += np.uint32(1)
+            place[piece, i] += np.uint32(1)
+    for i in prange(count):
+        _sort(incident, key, start[i], place[walls - 1, i])
+        _sort(incident, key, place[walls, i], start[i + 1])
+
+
 @inline
-def _place(incident, key, begin, end, edge, other):
-    """Insert an edge into the sorted list of a particle; `key` holds the ids of the other bodies."""
-    place = end
-    while place > begin and key[place - 1] > other:
-        incident[place], key[place] = incident[place - 1], key[place - 1]
-        place -= 1
-    incident[place], key[place] = edge, other
+def _sort(incident, key, begin, end):
+    """Sort a part of a list of edges by the ids of the other bodies, `key`."""
+    for last in range(begin + 1, end):
+        edge, other, place = incident[last], key[last], last
+        while place > begin and key[place - 1] > other:
+            incident[place], key[place] = incident[place - 1], key[place - 1]
+            place -= 1
+        incident[place], key[place] = edge, other
 
 
 @inline
@@ -246,13 +270,22 @@ def _edge_of(edges, i, j, wall):
     return -1
 
 
-@serial
+@threaded
 def _find(old, new, old_row, source):
     """Find the old edge of each new one; -1 for new pairs."""
-    for k in range(len(new.first)):
+    for k in prange(len(new.first)):
         wall = k >= new.between_particles
         i, j = old_row[new.first[k]], new.second[k] if wall else old_row[new.second[k]]
         source[k] = _edge_of(old, i, j, wall)
+
+
+@threaded
+def _take(old, source, width, values):
+    """Take over rows of numbers from an earlier list, where there is an earlier row."""
+    for k in prange(len(source)):
+        if source[k] >= 0:
+            for column in range(width):
+                values[width * k + column] = old[width * source[k] + column]
 
 
 @serial
@@ -271,9 +304,9 @@ def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> n
     return result
 
 
-@serial
+@threaded
 def _gaps(edges, particles, walls, shift, result):
-    for k in range(len(result)):
+    for k in prange(len(result)):
         if k < edges.between_particles:
             _, distance, radii = of_two_spheres(k, particles, edges, shift)
             result[k] = distance - radii

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.backend.compile import use_threads
+from cfddem.backend.compile import use_gpu, use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
@@ -152,6 +152,7 @@ class ParticleSolver:
             self.pair_fields, table, self.box, communicator=communicator, division=sharing.division,
             balance=sharing.balance, skin=settings.skin, sort_every=settings.sort_every,
         )  # fmt: skip
+        self._gpu = self._steps_on_gpu(settings.energies) if use_gpu(None) else None
         for field in self.laws.particle_fields():
             particles.declare(field)
         self.particles = self.lists.own(particles)
@@ -344,15 +345,27 @@ class ParticleSolver:
             feature.restore(state["features"][feature.name])
 
     def _integrate(self, step: float, steps: int) -> tuple[int, float, int]:
+        return self._loop_in_use()(  # type: ignore[no-any-return]
+            self.system, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time,
+            self._rows_for(len(self.edges.first)),
+        )  # fmt: skip
+
+    def _loop_in_use(self) -> Any:
+        """The loop for the processor and the threads in use."""
+        if self._gpu is not None:
+            return self._gpu
         threads = self.lists.many and use_threads(None) > 1  # one thread gains nothing from loops for all
         if self._loop is _NO_LOOP or self._threads != threads:
             self._threads, self._loop = threads, specialise(integrate, self.choices, threads)
             if self.communicator.size > 1:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
-        return self._loop(  # type: ignore[no-any-return]
-            self.system, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time,
-            self._rows_for(len(self.edges.first)),
-        )  # fmt: skip
+        return self._loop
+
+    def _steps_on_gpu(self, energies: bool) -> Any:
+        from cfddem.particles.on_gpu import LISTING_COST, StepsOnGpu
+
+        self.lists.listing_cost = LISTING_COST
+        return StepsOnGpu(self.choices, energies=energies, ranks=self.communicator.size)
 
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""

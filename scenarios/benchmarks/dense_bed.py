@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.compile import use_threads
+from cfddem.backend.compile import use_gpu, use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
@@ -33,7 +33,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from scenarios.benchmarks import kept_speeds
-from scenarios.benchmarks.memory import bytes_of_step, triad
+from scenarios.benchmarks.memory import bytes_of_step, triad, triad_of_gpu
 
 DATA = Path(__file__).parents[1] / "data"
 DIAMETER, STEP = 1e-3, 1e-5
@@ -49,6 +49,9 @@ GRAIN = Material(
 WATER = BridgeLaws(
     viscosity=1e-3, surface_tension=0.072, film="deforming", cut="constant", tangential="davis", minimum_gap=1e-7
 )
+GPU_STEPS = 25
+"""A measurement on a graphics processor has this many times the steps of one on the processor."""
+
 BLOCKS = {1_000: (1, 1), 10_000: (1, 1), 100_000: (5, 2), 1_000_000: (10, 10)}
 
 
@@ -93,6 +96,7 @@ def bench(
     rounds: int = 3,
     steps: int | None = None,
     full: bool = False,
+    gpu: bool = False,
 ) -> dict[str, Any]:
     """Million particle-steps a second on this machine, and that of LAMMPS where it is installed.
 
@@ -103,28 +107,35 @@ def bench(
     rounds   measurements of each code, taken in turn; their medians count
     steps    of one measurement
     full     with films that resist sliding and rolling, too; the bed with normal films is a further peer
+    gpu      steps on a graphics processor; the same bed on the processor is a peer
     returns  what was run, the medians, the speed over that of each LAMMPS style or why it did not run (`lammps`), and
              the bytes that a step must move with the share of the memory speed that this is
     """
-    steps = steps or max(20, 20_000_000 // count)
-    bandwidth = triad(threads)
+    steps = steps or max(20, 20_000_000 // count) * (GPU_STEPS if gpu else 1)
+    bandwidth = triad_of_gpu() if gpu else triad(threads)
     use_threads(threads)
     films: dict[str, Any] = {"motions": "full" if full else "normal"}
+    before = use_gpu(None)
+    use_gpu(gpu)
     runs = {"cfddem": bed(count, film or full, bridges, **films)}
+    use_gpu(before)
+    if gpu:
+        runs["the processor"] = bed(count)
     if film or full:
         runs["without films"] = bed(count, bridges=bridges)
     if full:
         runs["normal films"] = bed(count, True, bridges)
     if bridges:
         runs["without bridges"] = bed(count, film or full, **films)
-    dry = not (film or full or bridges)
+    dry = not (film or full or bridges or gpu)
     note = missing(threads) if dry else "has no such bed"
     speeds: dict[str, list[float]] = {name: [] for name in runs}
-    for run in runs.values():
-        run.advance(STEP, steps)
+    lengths = {name: max(20, steps // GPU_STEPS) if name == "the processor" else steps for name in runs}
+    for name, run in runs.items():
+        run.advance(STEP, lengths[name])
     for _ in range(rounds):
         for name, run in runs.items():
-            speeds[name].append(_speed(run, steps))
+            speeds[name].append(_speed(run, lengths[name]))
         for style, name in {} if note else STYLES.items():
             rate = speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
             if isinstance(rate, str):
@@ -138,6 +149,7 @@ def bench(
     return {
         "particles": count,
         "threads": threads,
+        "gpu": _gpu() if gpu else "",
         "film": film or full,
         "films that resist sliding": full,
         "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
@@ -166,7 +178,9 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     water += " that resists sliding and rolling" if result["films that resist sliding"] else ""
     if result["bridges per particle"]:
         water += f", {result['bridges per particle']:.1f} liquid bridges per sphere"
-    yield "bed", f"{result['particles']} spheres, {result['threads']} thread(s){water}, {result['steps']} steps a round"
+    where = f", steps on {result['gpu']}" if result["gpu"] else ""
+    size = f"{result['particles']} spheres, {result['threads']} thread(s)"
+    yield "bed", f"{size}{where}{water}, {result['steps']} steps a round"
     for name, speed in result["million particle-steps per second"].items():
         ratio = result["ratio"].get(name)
         kept = kept_speeds.beside(kept_speeds.dense_bed(result), speed)
@@ -177,8 +191,14 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "memory", f"{result['peak memory of the process [MB]']:.0f} MB at most, Python and compiler included"
     moved, share = result["bytes of a particle-step"], result["share of the triad"]
     yield "", f"{moved:.0f} bytes a particle-step: {share:.2f} of the triad, {result['triad [GB/s]']:.1f} GB/s"
-    if result["lammps"] and not water:
+    if result["lammps"] and not water and not result["gpu"]:
         yield "LAMMPS", result["lammps"]
+
+
+def _gpu() -> str:
+    from cfddem.backend.gpu import name_of_gpu
+
+    return name_of_gpu()
 
 
 def _peak_memory() -> float:

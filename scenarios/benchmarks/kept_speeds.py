@@ -36,7 +36,8 @@ def dense_bed(result: dict[str, Any]) -> str:
     """Name of a dense bed, from its result."""
     films = ", films that resist sliding" if result["films that resist sliding"] else ", films" * result["film"]
     bridges = ", bridges" if result["bridges per particle"] else ""
-    return f"dense bed of {result['particles']}{films}{bridges}, {result['threads']} thread(s)"
+    gpu = f", {result['gpu']}" if result["gpu"] else ""
+    return f"dense bed of {result['particles']}{films}{bridges}{gpu}, {result['threads']} thread(s)"
 
 
 def fluid_box(cells: list[int], threads: int) -> str:

@@ -44,6 +44,29 @@ def _triad(a, b, c, s):
         a[n] = b[n] + s * c[n]
 
 
+def triad_of_gpu(count: int = 50_000_000, repeats: int = 5) -> float:
+    """The same of the graphics processor [bytes/s]."""
+    from numba import cuda
+
+    from cfddem.backend.gpu import BLOCK
+
+    @cuda.jit
+    def loop(a, b, c, s):  # type: ignore[no-untyped-def]
+        n = cuda.grid(1)
+        if n < len(a):
+            a[n] = b[n] + s * c[n]
+
+    arrays = [cuda.to_device(np.ones(count)) for _ in range(3)]
+    best = np.inf
+    for _ in range(repeats + 1):  # the first compiles
+        cuda.synchronize()
+        begin = time.perf_counter()
+        loop[-(-count // BLOCK), BLOCK](*arrays, 3.0)
+        cuda.synchronize()
+        best = min(best, time.perf_counter() - begin)
+    return 24 * count / best
+
+
 def bytes_of_step(run: ParticleSolver) -> float:
     """Bytes that a particle step must move if nothing were found in a cache between its passes [bytes].
 

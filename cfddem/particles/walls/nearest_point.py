@@ -231,11 +231,12 @@ def carried_back(walls, m, place):
 def touch(at_walls):
     """Geometry of each particle-wall edge: normal, distance, velocity of the surface, turning rate of the normal."""
     for k in prange(at_walls.between_particles, len(at_walls.first)):
-        _touch_edge(k, at_walls)
+        touch_edge(k, at_walls)
 
 
 @inline
-def _touch_edge(k, at_walls):
+def touch_edge(k, at_walls):
+    """Geometry of particle-wall edge k."""
     i, w, free = np.int64(at_walls.first[k]), np.int64(at_walls.second[k]), at_walls.free
     m = np.int64(at_walls.wall[w])
     place = at(at_walls.position, i)

@@ -1,0 +1,122 @@
+"""How a loop is compiled for a graphics processor (GPU): the third way, beside one thread and several.
+
+Importing this module needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one particle or one pair are
+the same functions as on the processor; only the loop around them is another one.
+
+    kernel   a loop that runs on the GPU, started from Python
+    device   a function that a kernel calls: every function is, when it is compiled for a kernel
+
+A product and the sum that it enters are rounded one after the other, as on the processor. So both give the same bits
+where they call no functions but roots.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba import cuda
+from numba.core.errors import NumbaPerformanceWarning
+
+from cfddem.backend.errors import InputError
+from cfddem.backend.law_set import specialise
+
+BLOCK = 128
+"""Threads of a block."""
+
+SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
+"""Whether kernels run in the simulator of numba-cuda, which needs no GPU: for tests."""
+
+
+class _Kernel:
+    """A loop for the GPU before its slots are filled."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func, self.__name__, self.compiled_as = function, function.__name__, _compiled
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """A loop for the GPU as a template; `for_gpu` compiles it."""
+    return _Kernel(function)
+
+
+def _compiled(function: Callable[..., Any]) -> Any:
+    return cuda.jit(function)
+
+
+def device(function: Callable[..., Any]) -> Any:
+    """A function that loops on the GPU call."""
+    return function if SIMULATED else cuda.jit(device=True)(function)
+
+
+def for_gpu(template: Any, choices: Mapping[str, Any]) -> Any:
+    """The loop of a `kernel` for chosen laws; see :func:`cfddem.backend.law_set.specialise`."""
+    return specialise(template, choices, way=lambda mark: mark if mark is _compiled else device)
+
+
+def name_of_gpu() -> str:
+    """The GPU that is used; InputError with what is missing where there is none."""
+    if SIMULATED:
+        return "simulated"
+    try:
+        return str(cuda.get_current_device().name)
+    except Exception as failure:  # the driver, its library or the device is missing
+        words = " ".join(str(failure).split())
+        found = words if len(words) <= 80 else f"{words[:80]} ..."
+        remedy = "pip install 'cfddem[gpu]', and see nvidia-smi; or run without --gpu"
+        raise InputError("gpu", found or type(failure).__name__, "a GPU of NVIDIA with its driver", remedy) from None
+
+
+class DeviceArrays:
+    """Arrays on the GPU by name; the memory of an array is used again for the next one of the same shape."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[str, Any] = {}
+
+    def sent(self, name: str, array: np.ndarray, changed: bool = True) -> Any:
+        """The array on the GPU.
+
+        changed  copy its values, also where there was one of this name and shape
+        """
+        there = self._arrays.get(name)
+        if there is None or there.shape != array.shape:
+            self._arrays.pop(name, None)
+            self._arrays[name] = there = cuda.to_device(array)
+        elif changed and array.size:
+            there.copy_to_device(array)
+        return there
+
+    def receive(self, name: str, array: np.ndarray) -> None:
+        """Write the values of the array on the GPU into one of the processor."""
+        if array.size:
+            self._arrays[name].copy_to_host(array)
+
+
+def launch(loop: Any, rows: int, *arguments: Any) -> None:
+    """Run a loop whose threads wait for one another: as many as it has rows, or as the GPU can hold at a time."""
+    if SIMULATED:
+        loop[1, 2](*arguments)
+        return
+    with _rounded_as_on_the_processor(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaPerformanceWarning)  # few rows need few threads
+        compiled = loop.compile(tuple(loop.typeof_pyval(argument) for argument in arguments))
+        blocks = min(compiled.max_cooperative_grid_blocks(BLOCK), max(1, -(-rows // BLOCK)))
+        loop[blocks, BLOCK](*arguments)
+
+
+@contextmanager
+def _rounded_as_on_the_processor() -> Iterator[None]:
+    """Compile without instructions that round a product and a sum at once, for which the compiler has no option."""
+    from numba.cuda.cudadrv import nvvm
+
+    original = nvvm.compile_ir
+    nvvm.compile_ir = partial(original, fma=False)
+    try:
+        yield
+    finally:
+        nvvm.compile_ir = original

@@ -1,0 +1,194 @@
+"""The steps of :mod:`cfddem.particles.integrate` on a graphics processor.
+
+One thread a particle, one thread a pair: what a thread does to its particle or pair are the functions that the loops
+of the processor call. A thread of a particle sums the forces of its pairs in their order, so that results are the same
+bits in every run. All steps until the next neighbour list are one launch, in which all threads wait for one another
+between pairs and particles. Neighbour lists are made by the processor.
+
+Arrays travel at each call: particles both ways, what pairs remember, and the graph where it is new.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import cuda
+
+from cfddem.backend.errors import InputError
+from cfddem.backend.gpu import DeviceArrays, for_gpu, kernel, launch, name_of_gpu
+from cfddem.backend.named import named_arrays
+from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
+from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches
+from cfddem.particles.system import System
+from cfddem.particles.walls.mesh_contacts import pairs_at_walls
+from cfddem.particles.walls.nearest_point import advance_walls, touch_edge
+
+LISTING_COST = 500.0
+"""Cost of a new list, which the processor makes, in the units of :data:`cfddem.particles.listing.LISTING_COST`."""
+
+READ = ("position", "velocity", "spin", "radius", "inverse_mass", "inverse_inertia", "material", "applied", "force",
+        "torque")  # fmt: skip
+"""Fields of the particles that the steps read."""
+
+FOUND = ("position", "velocity", "spin", "force", "torque")
+"""Fields of the particles that the steps write."""
+
+WALLS = ("kind", "shape", "corner", "material", "wall", "velocity", "spin", "centre", "shift", "turned", "sweep",
+         "travel")  # fmt: skip
+"""Arrays of the walls that the steps read."""
+
+MOVED = ("shift", "turned", "travel")
+"""Those that they write."""
+
+
+class _Graph(NamedTuple):
+    """Arrays `GRAPH` and numbers of a `Graph`."""
+
+    first: Any
+    second: Any
+    image: Any
+    start: Any
+    incident: Any
+    touch: Any
+    between_particles: int
+    near: int
+
+
+GRAPH = _Graph._fields[:-2]
+"""Those of its members that are arrays."""
+
+
+class _Parameters(NamedTuple):
+    gravity: tuple[float, float, float]
+    free: Any
+    rolling_damping: float
+    contact: Any
+
+
+class _System(NamedTuple):
+    """What `System` and `PairSystem` are on the processor."""
+
+    particles: Any
+    edges: _Graph
+    memory: Any
+    walls: Any
+    shift: Any
+    rows: Any
+    table: Any
+    kinds: int
+    parameters: _Parameters
+
+
+@kernel
+def _steps(system, at_walls, step, steps, origin, reach, moved_far, done):
+    """Find the forces at the present positions (`steps` = 0), or make steps until a particle has moved by `reach`."""
+    grid = cuda.cg.this_grid()
+    mine, threads = cuda.grid(1), cuda.gridsize(1)
+    particles, edges = system.particles, system.edges
+    count, pairs = len(particles.radius), may_touch(edges)
+    half = step if steps > 0 else 0.0
+    for n in range(max(steps, 1)):
+        if steps > 0:
+            for i in range(mine, count, threads):
+                kick(i, particles, step, False)
+                if not drift(i, particles, system.parameters.free, step, origin) < reach * reach:
+                    moved_far[n] = 1
+            if mine == 0 and not advance_walls(system.walls, step) < reach:
+                moved_far[n] = 1
+        grid.sync()
+        for k in range(mine, pairs, threads):
+            pair_touches(k, system)
+            if system.memory.touching[k] != 0:
+                pair_force(k, system, half)
+        for k in range(edges.between_particles + mine, len(edges.first), threads):
+            touch_edge(k, at_walls)
+            wall_contact(np.uint64(k), system, half)
+        grid.sync()
+        for i in range(mine, count, threads):
+            gather_forces(i, system, pairs)
+            if steps > 0:
+                kick(i, particles, step, True)
+        if mine == 0:
+            done[0] = n + 1
+        if moved_far[n] != 0:
+            break
+
+
+LEFT_OUT = {
+    "FILM": "films",
+    "BRIDGE": "liquid bridges",
+    "TRIANGLES": "walls of triangles",
+    "RECORD": "a record of collisions",
+}
+"""What the steps on a GPU do not have yet, by the slot of the loops that tells."""
+
+
+class StepsOnGpu:
+    """The loop of :func:`cfddem.particles.integrate.integrate` on a GPU.
+
+    choices   what the run puts into the slots of the loops
+    energies  whether energies are counted, which only the processor does
+    ranks     processes that share the particles
+    """
+
+    def __init__(self, choices: Mapping[str, Any], energies: bool, ranks: int) -> None:
+        found = [what for slot, what in LEFT_OUT.items() if choices[slot]]
+        found += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
+        if found:
+            remedy = "leave them out, or run without --gpu"
+            raise InputError("gpu", " and ".join(found), "a run of dry contacts", remedy)
+        name_of_gpu()  # refuses where there is none
+        self._steps, self._arrays = for_gpu(_steps, choices), DeviceArrays()
+        self._listed: Any = None
+
+    def __call__(
+        self, system: System, step: float, steps: int, origin: np.ndarray, reach: float, time: float, log: np.ndarray
+    ) -> tuple[int, float, int]:
+        """Arguments and results of `integrate`."""
+        there = self._sent(system)
+        at_walls = pairs_at_walls.py_func(there)
+        at_walls = at_walls._replace(free=self._arrays.sent("free", at_walls.free))
+        moved_far, done = np.zeros(max(steps, 1), np.uint8), np.zeros(1, np.int64)
+        launch(
+            self._steps, max(system.particles.owned, len(system.edges.first)), there, at_walls, step, steps,
+            self._arrays.sent("origin", origin), reach, self._arrays.sent("moved_far", moved_far),
+            self._arrays.sent("done", done),
+        )  # fmt: skip
+        self._receive(system)
+        for name, array in (("moved_far", moved_far), ("done", done)):
+            self._arrays.receive(name, array)
+        return min(int(done[0]), steps), math.inf if moved_far.any() else 0.0, 0
+
+    def _sent(self, system: System) -> _System:
+        """The system on the GPU."""
+        new = system.edges.first is not self._listed
+        self._listed = system.edges.first
+        sent, parameters, table = self._arrays.sent, system.parameters, np.asarray(system.table)
+
+        def part(of: str, names: tuple[str, ...], **changed: bool) -> list[Any]:
+            arrays = getattr(system, of)
+            return [sent(f"{of}.{name}", getattr(arrays, name), changed.get(name, True)) for name in names]
+
+        return _System(
+            particles=named_arrays("Particles", READ)(*part("particles", READ)),
+            edges=_Graph(
+                *part("edges", GRAPH, **dict.fromkeys(GRAPH, new)), system.edges.between_particles, system.edges.near
+            ),
+            memory=type(system.memory)(*part("memory", system.memory._fields, **dict.fromkeys(WRITTEN, False))),
+            walls=named_arrays("Memory", WALLS)(*part("walls", WALLS)),
+            shift=sent("shift", system.shift),
+            rows=sent("rows", table.reshape(-1)),
+            table=sent("table", table),
+            kinds=len(table),
+            parameters=_Parameters(parameters.gravity, parameters.free, parameters.rolling_damping, parameters.contact),
+        )
+
+    def _receive(self, system: System) -> None:
+        """What the steps have written."""
+        received = {"particles": FOUND, "edges": ("touch",), "memory": system.memory._fields, "walls": MOVED}
+        for part, names in received.items():
+            for name in names:
+                self._arrays.receive(f"{part}.{name}", getattr(getattr(system, part), name))

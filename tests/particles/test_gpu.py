@@ -1,0 +1,105 @@
+"""Steps on a graphics processor against those of the processor, in the simulator of the compiler, which needs no GPU."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cfddem import Laws, Material, ParticleSolver, SolverSettings, make_particles, pair_table
+from cfddem.backend.compile import use_gpu
+from cfddem.backend.errors import InputError
+from cfddem.particles.walls.meshes import Mesh
+
+SYSTEM = """
+import sys
+import numpy as np
+from cfddem.backend.compile import use_gpu
+from cfddem.case.materials import Material
+from cfddem.particles.initial.packing import lattice
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Cylinder, Plane
+
+gpu, contact, rolling, path = sys.argv[1] == "gpu", *sys.argv[2:]
+glass = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.7, friction=0.4,
+                 rolling_friction=0.01, surface_energy=0.005)
+draw = np.random.default_rng(2)
+places = lattice(1e-3, ((0, 0, 0), (4.0e-3, 4.0e-3, 3.0e-3)), 1.0)
+places = places + draw.uniform(-2e-5, 2e-5, places.shape)
+size = 0.5e-3 * draw.uniform(0.97, 1.03, len(places))
+spheres = make_particles(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
+                         spin=draw.normal(0, 50.0, places.shape), fixed=np.arange(len(places)) == 5)
+table = pair_table([glass])
+use_gpu(gpu)
+walls = [Plane(velocity=(0.1, 0.0, 0.0)), Cylinder(point=(2e-3, 0.0, 1.5e-3), axis=(0.0, 1.0, 0.0), radius=2.29e-3, spin=(0.0, 5.0, 0.0))]
+run = ParticleSolver(spheres, table.view(np.recarray) if gpu else table, walls=walls,
+                     laws=Laws(contact=contact, rolling=rolling), gravity=(0.0, 0.0, -9.81), box=(None, 4.0e-3, None))
+spheres.applied[:] = 1e-7
+run.advance(1e-6, 15)
+made = run.lists.made
+spheres.velocity[7] += 0.3
+run.advance(1e-6, 5)
+assert np.abs(run.edges.spring).max() > 0.0 and len(run.edges.first) > run.edges.between_particles > 50
+np.savez(path, position=spheres.position, velocity=spheres.velocity, spin=spheres.spin, force=spheres.force,
+         torque=spheres.torque, edge_force=run.edges.force, edge_spring=run.edges.spring, walls=run.wall_force,
+         shift=run.walls.shift, lists=[made, run.lists.made])
+"""
+
+
+@pytest.mark.parametrize(
+    "contact, rolling", [("hertz", "none"), pytest.param("jkr", "spring_dashpot", marks=pytest.mark.slow)]
+)
+def test_steps_on_a_gpu_have_the_bits_of_those_on_the_processor(contact: str, rolling: str, tmp_path: Path) -> None:
+    """48 spheres, one of them fixed, a sliding plane, a cylinder, a force from outside; 20 steps and new lists."""
+    states = {}
+    for where, settings in (("processor", {}), ("gpu", {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"})):
+        path = tmp_path / f"{where}.npz"
+        done = subprocess.run(
+            [sys.executable, "-c", SYSTEM, where, contact, rolling, str(path)], capture_output=True, text=True,
+            env={**os.environ, "NUMBA_NUM_THREADS": "1", **settings}, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr[-2000:]
+        with np.load(path) as arrays:
+            states[where] = {name: arrays[name] for name in arrays.files}
+    for name, values in states["processor"].items():
+        np.testing.assert_array_equal(states["gpu"][name], values, err_msg=name)
+
+
+GLASS = Material(density=2500.0, youngs_modulus=1e7, poisson=0.25)
+CORNERS = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
+FLOOR = Mesh(vertices=CORNERS, triangles=np.array([[0, 1, 2]]))
+
+
+@pytest.mark.parametrize(
+    "others, words",
+    [
+        ({"laws": Laws(film=True)}, "films"),
+        ({"walls": [FLOOR]}, "walls of triangles"),
+        ({"settings": SolverSettings(record=True)}, "a record of collisions"),
+        ({"settings": SolverSettings(energies=True)}, "an energy account"),
+    ],
+)
+def test_what_a_gpu_does_not_have_is_refused(others: dict, words: str) -> None:
+    use_gpu(True)
+    try:
+        with pytest.raises(InputError, match=f"gpu = '{words}': must be a run of dry contacts"):
+            ParticleSolver(make_particles([[0.0, 0.0, 1e-3]], 1e-3, 2500.0), pair_table([GLASS]), **others)
+    finally:
+        use_gpu(False)
+
+
+def test_a_machine_without_a_gpu_is_told_what_is_missing() -> None:
+    """One line, with the remedy."""
+    from cfddem.backend.gpu import name_of_gpu
+
+    try:
+        name_of_gpu()
+    except InputError as failure:
+        assert "cfddem[gpu]" in str(failure) and "\n" not in str(failure)
