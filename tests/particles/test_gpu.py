@@ -1,4 +1,4 @@
-"""Steps on a graphics processor against those of the processor, in the simulator of the compiler, which needs no GPU."""
+"""Steps on a graphics processor against those of the processor, in the simulator of the compiler: without a GPU."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ spheres = make_particles(places, size, 2500.0, velocity=draw.normal(0, 0.05, pla
                          spin=draw.normal(0, 50.0, places.shape), fixed=np.arange(len(places)) == 5)
 table = pair_table([glass])
 use_gpu(gpu)
-walls = [Plane(velocity=(0.1, 0.0, 0.0)), Cylinder(point=(2e-3, 0.0, 1.5e-3), axis=(0.0, 1.0, 0.0), radius=2.29e-3, spin=(0.0, 5.0, 0.0))]
+walls = [Plane(velocity=(0.1, 0.0, 0.0)),
+         Cylinder(point=(2e-3, 0.0, 1.5e-3), axis=(0.0, 1.0, 0.0), radius=2.29e-3, spin=(0.0, 5.0, 0.0))]
 run = ParticleSolver(spheres, table.view(np.recarray) if gpu else table, walls=walls,
                      laws=Laws(contact=contact, rolling=rolling), gravity=(0.0, 0.0, -9.81), box=(None, 4.0e-3, None))
 spheres.applied[:] = 1e-7
