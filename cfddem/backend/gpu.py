@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from numba import cuda
-from numba.core.errors import NumbaPerformanceWarning
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
@@ -46,7 +45,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
-    return cuda.jit(function)
+    return cuda.jit(function) if SIMULATED else cuda.jit(function, lto=False)  # see `_rounded_as_on_the_processor`
 
 
 def device(function: Callable[..., Any]) -> Any:
@@ -91,6 +90,14 @@ class DeviceArrays:
             there.copy_to_device(array)
         return there
 
+    def room(self, name: str, array: np.ndarray) -> Any:
+        """Memory on the GPU for an array that a loop writes before it reads it; keeps its values between calls."""
+        there = self._arrays.get(name)
+        if there is None or there.shape != array.shape:
+            self._arrays.pop(name, None)
+            self._arrays[name] = there = cuda.device_array(array.shape, array.dtype)
+        return there
+
     def receive(self, name: str, array: np.ndarray) -> None:
         """Write the values of the array on the GPU into one of the processor."""
         if array.size:
@@ -103,7 +110,7 @@ def launch(loop: Any, rows: int, *arguments: Any) -> None:
         loop[1, 2](*arguments)
         return
     with _rounded_as_on_the_processor(), warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaPerformanceWarning)  # few rows need few threads
+        warnings.filterwarnings("ignore", ".*Grid size")  # few rows need few threads
         compiled = loop.compile(tuple(loop.typeof_pyval(argument) for argument in arguments))
         blocks = min(compiled.max_cooperative_grid_blocks(BLOCK), max(1, -(-rows // BLOCK)))
         loop[blocks, BLOCK](*arguments)
@@ -111,7 +118,10 @@ def launch(loop: Any, rows: int, *arguments: Any) -> None:
 
 @contextmanager
 def _rounded_as_on_the_processor() -> Iterator[None]:
-    """Compile without instructions that round a product and a sum at once, for which the compiler has no option."""
+    """Compile without instructions that round a product and a sum at once, for which the compiler has no option.
+
+    The program that links would make them again, so it gets machine code.
+    """
     from numba.cuda.cudadrv import nvvm
 
     original = nvvm.compile_ir

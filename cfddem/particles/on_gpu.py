@@ -168,16 +168,18 @@ class StepsOnGpu:
         self._listed = system.edges.first
         sent, parameters, table = self._arrays.sent, system.parameters, np.asarray(system.table)
 
-        def part(of: str, names: tuple[str, ...], **changed: bool) -> list[Any]:
-            arrays = getattr(system, of)
-            return [sent(f"{of}.{name}", getattr(arrays, name), changed.get(name, True)) for name in names]
+        def part(of: str, names: tuple[str, ...], changed: bool = True) -> list[Any]:
+            return [sent(f"{of}.{name}", getattr(getattr(system, of), name), changed) for name in names]
 
         return _System(
             particles=named_arrays("Particles", READ)(*part("particles", READ)),
-            edges=_Graph(
-                *part("edges", GRAPH, **dict.fromkeys(GRAPH, new)), system.edges.between_particles, system.edges.near
+            edges=_Graph(*part("edges", GRAPH, new), system.edges.between_particles, system.edges.near),
+            memory=type(system.memory)(
+                *(
+                    (self._arrays.room if name in WRITTEN else sent)(f"memory.{name}", array)
+                    for name, array in system.memory._asdict().items()
+                )
             ),
-            memory=type(system.memory)(*part("memory", system.memory._fields, **dict.fromkeys(WRITTEN, False))),
             walls=named_arrays("Memory", WALLS)(*part("walls", WALLS)),
             shift=sent("shift", system.shift),
             rows=sent("rows", table.reshape(-1)),
