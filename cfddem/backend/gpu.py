@@ -45,7 +45,8 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
-    return cuda.jit(function) if SIMULATED else cuda.jit(function, lto=False)  # see `_rounded_as_on_the_processor`
+    settings = {} if SIMULATED else {"lto": False}  # see `_rounded_as_on_the_processor`
+    return cuda.jit(function, **settings)
 
 
 def device(function: Callable[..., Any]) -> Any:
@@ -66,9 +67,9 @@ def name_of_gpu() -> str:
         return str(cuda.get_current_device().name)
     except Exception as failure:  # the driver, its library or the device is missing
         words = " ".join(str(failure).split())
-        found = words if len(words) <= 80 else f"{words[:80]} ..."
+        fault = words if len(words) <= 80 else f"{words[:80]} ..."
         remedy = "pip install 'cfddem[gpu]', and see nvidia-smi; or run without --gpu"
-        raise InputError("gpu", found or type(failure).__name__, "a GPU of NVIDIA with its driver", remedy) from None
+        raise InputError("gpu", fault or type(failure).__name__, "a GPU of NVIDIA with its driver", remedy) from None
 
 
 class DeviceArrays:

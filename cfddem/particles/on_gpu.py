@@ -22,6 +22,7 @@ from cfddem.backend.gpu import DeviceArrays, for_gpu, kernel, launch, name_of_gp
 from cfddem.backend.named import named_arrays
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
 from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches
+from cfddem.particles.pair_graph import Graph
 from cfddem.particles.system import System
 from cfddem.particles.walls.mesh_contacts import pairs_at_walls
 from cfddem.particles.walls.nearest_point import advance_walls, touch_edge
@@ -44,21 +45,8 @@ MOVED = ("shift", "turned", "travel")
 """Those that they write."""
 
 
-class _Graph(NamedTuple):
-    """Arrays `GRAPH` and numbers of a `Graph`."""
-
-    first: Any
-    second: Any
-    image: Any
-    start: Any
-    incident: Any
-    touch: Any
-    between_particles: int
-    near: int
-
-
-GRAPH = _Graph._fields[:-2]
-"""Those of its members that are arrays."""
+GRAPH = ("first", "second", "image", "touch", "start", "incident")
+"""Arrays of the graph."""
 
 
 class _Parameters(NamedTuple):
@@ -72,7 +60,7 @@ class _System(NamedTuple):
     """What `System` and `PairSystem` are on the processor."""
 
     particles: Any
-    edges: _Graph
+    edges: Graph
     memory: Any
     walls: Any
     shift: Any
@@ -135,11 +123,11 @@ class StepsOnGpu:
     """
 
     def __init__(self, choices: Mapping[str, Any], energies: bool, ranks: int) -> None:
-        found = [what for slot, what in LEFT_OUT.items() if choices[slot]]
-        found += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
-        if found:
+        refused = [words for slot, words in LEFT_OUT.items() if choices[slot]]
+        refused += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
+        if refused:
             remedy = "leave them out, or run without --gpu"
-            raise InputError("gpu", " and ".join(found), "a run of dry contacts", remedy)
+            raise InputError("gpu", " and ".join(refused), "a run of dry contacts", remedy)
         name_of_gpu()  # refuses where there is none
         self._steps, self._arrays = for_gpu(_steps, choices), DeviceArrays()
         self._listed: Any = None
@@ -160,7 +148,8 @@ class StepsOnGpu:
         self._receive(system)
         for name, array in (("moved_far", moved_far), ("done", done)):
             self._arrays.receive(name, array)
-        return min(int(done[0]), steps), math.inf if moved_far.any() else 0.0, 0
+        far = 1 in moved_far
+        return min(int(done[0]), steps), math.inf if far else 0.0, 0
 
     def _sent(self, system: System) -> _System:
         """The system on the GPU."""
@@ -173,7 +162,7 @@ class StepsOnGpu:
 
         return _System(
             particles=named_arrays("Particles", READ)(*part("particles", READ)),
-            edges=_Graph(*part("edges", GRAPH, new), system.edges.between_particles, system.edges.near),
+            edges=system.edges._replace(**dict(zip(GRAPH, part("edges", GRAPH, new)))),
             memory=type(system.memory)(
                 *(
                     (self._arrays.room if name in WRITTEN else sent)(f"memory.{name}", array)

@@ -205,16 +205,29 @@ def _incidence(
     far = np.linspace(near, between_particles, (threads if near < between_particles else 0) + 1).astype(np.int64)
     begin = np.concatenate([close[:-1], [between_particles], far[:-1]])
     end = np.concatenate([close[1:], [len(first)], far[1:]])
-    place = np.zeros((len(begin), count + 1), np.uint32)
-    start, edges = np.zeros(count + 1, np.int64), len(first) + between_particles
+    edges, pieces = len(first) + between_particles, _Pieces(ids, between_particles, begin, end, threads)
+    place, start = np.zeros((len(begin), count + 1), np.uint32), np.zeros(count + 1, np.int64)
     incident, key = np.empty(edges, np.int32), np.empty(edges, np.int64)
-    _list_edges(first, second, image, ids, between_particles, begin, end, threads, place, start, incident, key)
+    _list_edges(first, second, image, pieces, place, start, incident, key)
     return start, incident
 
 
+class _Pieces(NamedTuple):
+    ids: np.ndarray  # of the particles
+    between_particles: int
+    begin: np.ndarray  # first edge of each piece
+    end: np.ndarray
+    walls: int  # which piece is of edges at walls
+
+
 @threaded
-def _list_edges(first, second, image, ids, between_particles, begin, end, walls, place, start, incident, key):
-    """Turn pairs, and list the edges of each particle, piece by piece of the edges; `walls` is the piece of walls."""
+def _list_edges(first, second, image, edges, place, start, incident, key):
+    """Turn pairs, and list the edges of each particle, piece by piece of the edges.
+
+    place  where a piece puts its next edge of a particle
+    key    ids of the other bodies
+    """
+    ids, between_particles, begin, end, walls = edges
     pieces, count = len(begin), len(ids)
     for piece in prange(pieces):
         for k in range(begin[piece], end[piece]):
