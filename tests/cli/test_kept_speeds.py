@@ -3,7 +3,14 @@
 from scenarios.benchmarks import kept_speeds, table
 from scenarios.benchmarks.fluid_box import CELLS
 
-BED = {"particles": 10_000, "threads": 1, "film": True, "films that resist sliding": False, "bridges per particle": 0.0}
+BED = {
+    "particles": 10_000,
+    "threads": 1,
+    "film": True,
+    "gpu": "",
+    "films that resist sliding": False,
+    "bridges per particle": 0.0,
+}
 
 
 def test_every_benchmark_of_the_table_has_a_kept_speed():
