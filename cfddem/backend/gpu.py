@@ -20,10 +20,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import cuda
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
+
+try:
+    from numba import cuda
+except ImportError:
+    raise InputError("gpu", None, "used where numba-cuda is installed", "pip install 'cfddem[gpu]'") from None
 
 BLOCK = 128
 """Threads of a block."""

@@ -15,10 +15,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda
 
 from cfddem.backend.errors import InputError
-from cfddem.backend.gpu import DeviceArrays, for_gpu, kernel, launch, name_of_gpu
+from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, kernel, launch, name_of_gpu
 from cfddem.backend.named import named_arrays
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
 from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches

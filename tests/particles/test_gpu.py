@@ -15,6 +15,8 @@ from cfddem.backend.compile import use_gpu
 from cfddem.backend.errors import InputError
 from cfddem.particles.walls.meshes import Mesh
 
+pytest.importorskip("numba.cuda", reason="the simulator is part of numba-cuda, and of older versions of numba")
+
 SYSTEM = """
 import sys
 import numpy as np
