@@ -69,7 +69,6 @@ __all__ = [
     "serial",
     "threaded",
     "threaded_part",
-    "use_gpu",
     "use_threads",
     "vector_inline",
     "vector_part",
@@ -84,6 +83,10 @@ if "OMP_WAIT_POLICY" not in os.environ:
 
 CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
+
+
+MANY_ROWS = 1000
+"""Fewer rows than this are not worth the start of other threads."""
 
 
 # the compiler has this flag, but no word for it among the options of `njit`
@@ -130,6 +133,10 @@ class Threaded:
         alone = njit(**(CALLED | {"noalias": True}))
         self.one = kept_on_disk(alone(renamed(function, f"{function.__name__}_on_one_thread")))
         self.all = kept_on_disk(njit(**CALLED, parallel=True)(function))
+
+    def over(self, rows: int) -> Any:
+        """The loop for this many rows: on one thread where more would not pay."""
+        return self if rows >= MANY_ROWS else self.one
 
     @property
     def in_use(self) -> Any:
@@ -248,20 +255,6 @@ def use_threads(count: int | None) -> int:
         except ValueError as refusal:
             raise InputError("threads", count, f"1 to {_most_threads()} on this machine") from refusal
     return int(get_num_threads())
-
-
-_GPU = [False]
-
-
-def use_gpu(choice: bool | None) -> bool:
-    """Let particle solvers that are made from now on make their steps on a graphics processor, or not.
-
-    choice   None: leave as it is
-    returns  what holds now
-    """
-    if choice is not None:
-        _GPU[0] = choice
-    return _GPU[0]
 
 
 def _most_threads() -> int:

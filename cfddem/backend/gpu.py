@@ -1,13 +1,13 @@
 """How a loop is compiled for a graphics processor (GPU): the third way, beside one thread and several.
 
-Importing this module needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one particle or one pair are
+Using it needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one particle or one pair are
 the same functions as on the processor; only the loop around them is another one.
 
     kernel   a loop that runs on the GPU, started from Python
     device   a function that a kernel calls: every function is, when it is compiled for a kernel
 
 A product and the sum that it enters are rounded one after the other, as on the processor. So both give the same bits
-where they call no functions but roots.
+where they call no functions but square roots.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,8 @@ from cfddem.backend.law_set import specialise
 
 try:
     from numba import cuda
-except ImportError:
-    raise InputError("gpu", None, "used where numba-cuda is installed", "pip install 'cfddem[gpu]'") from None
+except ImportError:  # later versions leave it to numba-cuda; see `name_of_gpu`
+    cuda: Any = None  # type: ignore[no-redef]
 
 BLOCK = 128
 """Threads of a block."""
@@ -67,13 +68,20 @@ def name_of_gpu() -> str:
     """The GPU that is used; InputError with what is missing where there is none."""
     if SIMULATED:
         return "simulated"
+    if find_spec("numba_cuda") is None:
+        raise InputError("gpu", True, "false where numba-cuda is missing", "pip install 'cfddem[gpu]'")
     try:
         return str(cuda.get_current_device().name)
     except Exception as failure:  # the driver, its library or the device is missing
-        words = " ".join(str(failure).split())
-        fault = words if len(words) <= 80 else f"{words[:80]} ..."
-        remedy = "pip install 'cfddem[gpu]', and see nvidia-smi; or run without --gpu"
-        raise InputError("gpu", fault or type(failure).__name__, "a GPU of NVIDIA with its driver", remedy) from None
+        raise of_gpu(failure) from None
+
+
+def of_gpu(failure: Exception) -> InputError:
+    """A failure of driver, compiler or memory of the GPU as one line."""
+    words = " ".join(str(failure).split()) or type(failure).__name__
+    fault = words if len(words) <= 100 else f"{words[:100]} ..."
+    remedy = "see nvidia-smi for driver, memory and other work; or take gpu = false"
+    return InputError("gpu", fault, "one of NVIDIA with its driver and room for the run", remedy)
 
 
 class DeviceArrays:
@@ -96,7 +104,7 @@ class DeviceArrays:
         return there
 
     def room(self, name: str, array: np.ndarray) -> Any:
-        """Memory on the GPU for an array that a loop writes before it reads it; keeps its values between calls."""
+        """Memory on the GPU for an array that a loop writes before it reads it."""
         there = self._arrays.get(name)
         if there is None or there.shape != array.shape:
             self._arrays.pop(name, None)

@@ -32,7 +32,6 @@ THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
 FROM = "run folder whose end is the beginning of this run"
-GPU = "make the steps of the particles on a graphics processor; contacts without films and bridges"
 DIVISION = "ranks along x, y and z, such as 2x2x1; default: the shape with the least work of the busiest rank"
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
@@ -48,7 +47,6 @@ class Processors:
     threads: Annotated[int | None, Parameter(help=THREADS)] = None
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None
     division: Annotated[str | None, Parameter(help=DIVISION)] = None
-    gpu: Annotated[bool, Parameter(help=GPU, negative="")] = False
 
 
 WHOLE_MACHINE = Processors()
@@ -230,12 +228,11 @@ def run(
         resume(folder, processors=processors, log=log, json=json)
         return
     _refuse_or_warn(described, communicator)
-    from cfddem.backend.compile import use_gpu, use_threads
+    from cfddem.backend.compile import use_threads
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
     from cfddem.run.warmup import threads_for, warmup
 
-    use_gpu(processors.gpu)
     if communicator.size == 1:
         use_threads(threads_for(described, processors.threads))
     with live_line(log, communicator.rank == 0) as line:
@@ -312,7 +309,7 @@ def resume(
 
     Example: cfddem resume bed --until 0.03
     """
-    from cfddem.backend.compile import use_gpu, use_threads
+    from cfddem.backend.compile import use_threads
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
     from cfddem.run.resuming import case_to_continue
@@ -325,7 +322,6 @@ def resume(
         remedy = f"to go on with another value: cfddem run --from {folder} {values} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
     communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
-    use_gpu(processors.gpu)
     import_laws(laws or ())
     if until is None and (before := open_run(folder)).status == "finished":
         if communicator.rank == 0 and json:

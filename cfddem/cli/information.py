@@ -170,13 +170,15 @@ def _threads() -> Answer:
 
 
 def _gpu() -> Answer:
+    if find_spec("numba_cuda") is None:
+        return Answer("gpu", True, "not used; for one of NVIDIA: pip install 'cfddem[gpu]'")
     from cfddem.backend.errors import InputError
     from cfddem.backend.gpu import name_of_gpu
 
     try:
-        return Answer("gpu", True, f"{name_of_gpu()}; cfddem run CASE --gpu")
-    except InputError:
-        return Answer("gpu", True, "none; for one of NVIDIA: pip install 'cfddem[gpu]'")
+        return Answer("gpu", True, f"{name_of_gpu()}; used where a case says run.gpu = true")
+    except InputError as failure:
+        return Answer("gpu", True, f"none: {failure.value}")
 
 
 def _compiled_loops() -> Answer:

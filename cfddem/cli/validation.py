@@ -105,6 +105,8 @@ def bench(
     }
     if target not in targets:
         raise InputError("target", target, nearest(target, list(targets)))
+    if gpu and target != "dem":
+        raise InputError("--gpu", target, "used with the target dem")
     timed, rows = targets[target]
     result = timed()
     if json:

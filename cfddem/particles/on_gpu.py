@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.errors import InputError
-from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, kernel, launch, name_of_gpu
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, kernel, launch, name_of_gpu, of_gpu
 from cfddem.backend.named import named_arrays
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
 from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches
@@ -26,8 +26,8 @@ from cfddem.particles.system import System
 from cfddem.particles.walls.mesh_contacts import pairs_at_walls
 from cfddem.particles.walls.nearest_point import advance_walls, touch_edge
 
-LISTING_COST = 500.0
-"""Cost of a new list, which the processor makes, in the units of :data:`cfddem.particles.listing.LISTING_COST`."""
+STEPS = 4096
+"""The most steps of one launch."""
 
 READ = ("position", "velocity", "spin", "radius", "inverse_mass", "inverse_inertia", "material", "applied", "force",
         "torque")  # fmt: skip
@@ -121,34 +121,53 @@ class StepsOnGpu:
     ranks     processes that share the particles
     """
 
+    listing_cost = 500.0
+    """Cost of a new list, which the processor makes, in the units of :data:`cfddem.particles.listing.LISTING_COST`."""
+
     def __init__(self, choices: Mapping[str, Any], energies: bool, ranks: int) -> None:
         refused = [words for slot, words in LEFT_OUT.items() if choices[slot]]
         refused += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
         if refused:
-            remedy = "leave them out, or run without --gpu"
+            remedy = "leave them out, or take gpu = false"
             raise InputError("gpu", " and ".join(refused), "a run of dry contacts", remedy)
         name_of_gpu()  # refuses where there is none
         self._steps, self._arrays = for_gpu(_steps, choices), DeviceArrays()
+        self._moved_far, self._done = np.zeros(STEPS, np.uint8), np.zeros(1, np.int64)
         self._listed: Any = None
+        self._interrupted = False
 
     def __call__(
         self, system: System, step: float, steps: int, origin: np.ndarray, reach: float, time: float, log: np.ndarray
     ) -> tuple[int, float, int]:
-        """Arguments and results of `integrate`."""
-        there = self._sent(system)
-        at_walls = pairs_at_walls.py_func(there)
-        at_walls = at_walls._replace(free=self._arrays.sent("free", at_walls.free))
-        moved_far, done = np.zeros(max(steps, 1), np.uint8), np.zeros(1, np.int64)
+        """Arguments and results of `integrate`; at most `STEPS` steps."""
+        if self._interrupted:
+            raise RunFailed("an advance on the GPU was interrupted, and its results were not received; begin anew")
+        self._interrupted, steps = True, min(steps, STEPS)
+        try:
+            self._made(system, step, steps, origin, reach)
+        except Exception as failure:  # of the driver, of the compiler, or no memory is left
+            raise of_gpu(failure) from failure
+        self._interrupted = False
+        far = 1 in self._moved_far[: max(steps, 1)]
+        return min(int(self._done[0]), steps), math.inf if far else 0.0, 0
+
+    def _made(self, system: System, step: float, steps: int, origin: np.ndarray, reach: float) -> None:
+        """Make steps: send, launch and receive."""
+        sent, receive = self._arrays.sent, self._arrays.receive
+        on_gpu = self._sent(system)
+        at_walls = pairs_at_walls.py_func(on_gpu)
+        at_walls = at_walls._replace(free=sent("free", at_walls.free))
+        self._moved_far[:] = 0
         launch(
-            self._steps, max(system.particles.owned, len(system.edges.first)), there, at_walls, step, steps,
-            self._arrays.sent("origin", origin), reach, self._arrays.sent("moved_far", moved_far),
-            self._arrays.sent("done", done),
+            self._steps, max(system.particles.owned, len(system.edges.first)), on_gpu, at_walls, step, steps,
+            sent("origin", origin), reach, sent("moved_far", self._moved_far), sent("done", self._done),
         )  # fmt: skip
-        self._receive(system)
-        for name, array in (("moved_far", moved_far), ("done", done)):
-            self._arrays.receive(name, array)
-        far = 1 in moved_far
-        return min(int(done[0]), steps), math.inf if far else 0.0, 0
+        written = {"particles": FOUND, "edges": ("touch",), "memory": system.memory._fields, "walls": MOVED}
+        for part, names in written.items():
+            for name in names:
+                receive(f"{part}.{name}", getattr(getattr(system, part), name))
+        receive("moved_far", self._moved_far)
+        receive("done", self._done)
 
     def _sent(self, system: System) -> _System:
         """The system on the GPU."""
@@ -168,17 +187,10 @@ class StepsOnGpu:
                     for name, array in system.memory._asdict().items()
                 )
             ),
-            walls=named_arrays("Memory", WALLS)(*part("walls", WALLS)),
+            walls=named_arrays("Walls", WALLS)(*part("walls", WALLS)),
             shift=sent("shift", system.shift),
             rows=sent("rows", table.reshape(-1)),
             table=sent("table", table),
             kinds=len(table),
             parameters=_Parameters(parameters.gravity, parameters.free, parameters.rolling_damping, parameters.contact),
         )
-
-    def _receive(self, system: System) -> None:
-        """What the steps have written."""
-        received = {"particles": FOUND, "edges": ("touch",), "memory": system.memory._fields, "walls": MOVED}
-        for part, names in received.items():
-            for name in names:
-                self._arrays.receive(f"{part}.{name}", getattr(getattr(system, part), name))

@@ -97,13 +97,14 @@ class Edges(Table):
         old_row  (N,) int32, row that the particle of each new row had in the old list; -1 for new particles
         """
         source = np.empty(self.rows, np.int64)
-        _find(old.flat_graph, self.flat_graph, old_row, source)
+        _find.over(self.rows)(old.flat_graph, self.flat_graph, old_row, source)
         new = np.flatnonzero(source < 0)
         for name, field in self.fields.items():
             if field.role == "scratch" or name not in old or not old.rows:
                 continue
             if field.dtype is float:
-                _take(old[name].reshape(-1), source, max(math.prod(field.shape), 1), self[name].reshape(-1))
+                width = max(math.prod(field.shape), 1)
+                _take.over(self.rows)(old[name].reshape(-1), source, width, self[name].reshape(-1))
                 continue
             initial = self[name][new]
             np.take(old[name], source, axis=0, out=self[name], mode="wrap")  # faster than to choose the known ones
@@ -195,11 +196,15 @@ THICKEST = 0.02
 """Upper limit of the minimum gap over the reduced radius, unless asperities are larger."""
 
 
+MOST_PIECES = 16
+"""The edges are listed in no more pieces at a time, each of which needs a number for every particle."""
+
+
 def _incidence(
     first: np.ndarray, second: np.ndarray, image: np.ndarray, near: int, between_particles: int, ids: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Let the lower id of each pair be first, and list the edges of each particle by the id of the other body."""
-    count, threads = len(ids), get_num_threads()
+    count, threads = len(ids), min(get_num_threads(), MOST_PIECES)
     # in the order of the lists: near pairs, walls, far pairs; pairs in a piece for each thread
     close = np.linspace(0, near, threads + 1).astype(np.int64)
     far = np.linspace(near, between_particles, (threads if near < between_particles else 0) + 1).astype(np.int64)
@@ -208,7 +213,7 @@ def _incidence(
     edges, pieces = len(first) + between_particles, _Pieces(ids, between_particles, begin, end, threads)
     place, start = np.zeros((len(begin), count + 1), np.uint32), np.zeros(count + 1, np.int64)
     incident, key = np.empty(edges, np.int32), np.empty(edges, np.int64)
-    _list_edges(first, second, image, pieces, place, start, incident, key)
+    _list_edges.over(count)(first, second, image, pieces, place, start, incident, key)
     return start, incident
 
 
@@ -237,14 +242,17 @@ def _list_edges(first, second, image, edges, place, start, incident, key):
                 if ids[first[k]] > ids[second[k]]:
                     first[k], second[k] = second[k], first[k]
                     image[k] = 2 * HOME - image[k]
-    total = np.uint32(0)
-    for i in range(count):
-        start[i] = total
+    for i in prange(count):
         for piece in range(pieces):
-            number = place[piece, i]
+            start[i + 1] += place[piece, i]
+    for i in range(count):
+        start[i + 1] += start[i]
+    for i in prange(count):
+        total = start[i]
+        for piece in range(pieces):
+            number = np.int64(place[piece, i])
             place[piece, i] = total
             total += number
-    start[count] = total
     for piece in prange(pieces):
         for k in range(begin[piece], end[piece]):
             i = first[k]
@@ -313,7 +321,7 @@ def _find_named(edges, rows, bodies, places):
 def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> np.ndarray:
     """Gap of every edge (n,) [m]."""
     result = np.empty(len(edges.first))
-    _gaps(edges.flat_graph, particles.view, flat(walls), shifts(box).reshape(-1), result)
+    _gaps.over(edges.rows)(edges.flat_graph, particles.view, flat(walls), shifts(box).reshape(-1), result)
     return result
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.backend.compile import use_gpu, use_threads
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
@@ -62,6 +62,7 @@ class SolverSettings:
     energies     count energy by channel, in `energies`; slows the run down
     check_steps  refuse time steps above the stability limit
     after        an earlier run over the same particles and walls, whose pair memory is taken over
+    gpu          make the steps on a graphics processor; contacts without films and bridges alone
     """
 
     free: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -72,6 +73,7 @@ class SolverSettings:
     energies: bool = False
     check_steps: bool = True
     after: ParticleSolver | None = None
+    gpu: bool = False
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,10 @@ class ParticleSolver:
             self.pair_fields, table, self.box, communicator=communicator, division=sharing.division,
             balance=sharing.balance, skin=settings.skin, sort_every=settings.sort_every,
         )  # fmt: skip
-        self._gpu = self._steps_on_gpu(settings.energies) if use_gpu(None) else None
+        self._on_gpu = settings.gpu
+        if settings.gpu:
+            self._loop = self._steps_on_gpu(settings.energies)
+            self.lists.listing_cost = self._loop.listing_cost
         for field in self.laws.particle_fields():
             particles.declare(field)
         self.particles = self.lists.own(particles)
@@ -352,19 +357,16 @@ class ParticleSolver:
 
     def _loop_in_use(self) -> Any:
         """The loop for the processor and the threads in use."""
-        if self._gpu is not None:
-            return self._gpu
         threads = self.lists.many and use_threads(None) > 1  # one thread gains nothing from loops for all
-        if self._loop is _NO_LOOP or self._threads != threads:
+        if not self._on_gpu and (self._loop is _NO_LOOP or self._threads != threads):
             self._threads, self._loop = threads, specialise(integrate, self.choices, threads)
             if self.communicator.size > 1:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
         return self._loop
 
     def _steps_on_gpu(self, energies: bool) -> Any:
-        from cfddem.particles.on_gpu import LISTING_COST, StepsOnGpu
+        from cfddem.particles.on_gpu import StepsOnGpu
 
-        self.lists.listing_cost = LISTING_COST
         return StepsOnGpu(self.choices, energies=energies, ranks=self.communicator.size)
 
     def _take_list(self, edges: Edges) -> None:

@@ -76,6 +76,7 @@ def find_issues(
         *check_positions(case),
         *check_overlap(case, bed, collision),
         *check_surface_laws(case),
+        *check_gpu(case),
         *check_wall_drag(case),
         *check_wet(case, wet),
         *check_walls_and_feeds(case),
@@ -207,6 +208,24 @@ def check_surface_laws(case: Case) -> Iterator[Issue]:
             )  # fmt: skip
         if keys and not used:
             yield Issue("warning", keys[0], f'unused, because laws.{key} is "{law}"', f"set laws.{key}")
+
+
+def check_gpu(case: Case) -> Iterator[Issue]:
+    """Check that a case whose particles step on a graphics processor has dry contacts with exact walls alone."""
+    surfaces = [f"wall.{number}" for number, wall in enumerate(case.wall) if not wall.form.exact]
+    others = {
+        "laws.lubrication": case.has_films,
+        "liquid": case.liquid is not None,
+        "run.energy_budget": case.run.energy_budget,
+        "run.record_collisions": case.run.record_collisions,
+        "vessel.shape": case.vessel is not None and case.vessel.shape == "surface",
+    } | dict.fromkeys(surfaces, True)
+    keys = [key for key, is_there in others.items() if is_there]
+    if case.run.gpu and keys:
+        yield Issue(
+            "error", "run.gpu", f"steps on a graphics processor do not know {', '.join(keys)}",
+            "leave them out, or set run.gpu = false",
+        )  # fmt: skip
 
 
 def check_steps(case: Case, steps: StepEstimate) -> Iterator[Issue]:

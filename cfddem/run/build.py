@@ -95,7 +95,7 @@ def parts_of(
         gravity=case.laws.gravity if dry else (0.0, 0.0, 0.0),
         box=case.column.periodic_lengths,
         settings=SolverSettings(
-            domain=_domain(case), record=case.run.record_collisions, energies=case.run.energy_budget
+            domain=_domain(case), record=case.run.record_collisions, energies=case.run.energy_budget, gpu=case.run.gpu
         ),
         sharing=Sharing(communicator=communicator, division=division, balance=True),
     )

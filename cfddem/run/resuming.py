@@ -15,6 +15,7 @@ import numpy as np
 from cfddem.analysis.comparison import changed
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.gpu import name_of_gpu
 from cfddem.backend.law_set import check_compiles, fingerprint
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
@@ -178,10 +179,12 @@ THEN = ", then "
 
 
 def require_compiled(case: Case) -> None:
-    """Refuse a user's law that cannot be compiled, by its key.
+    """Refuse a user's law that cannot be compiled, by its key, and a GPU that is not there.
 
     errors  InputError
     """
+    if case.run.gpu:
+        name_of_gpu()
     for kind, law in case.laws.own_laws.items():
         check_compiles(f"laws.{kind}", law.function)
 

@@ -22,14 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.compile import use_gpu, use_threads
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from scenarios.benchmarks import kept_speeds
@@ -67,12 +67,18 @@ def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
 
 
 def bed(
-    count: int = 10_000, film: bool = False, bridges: bool = False, motions: str = "normal", reach: float = 1.0
+    count: int = 10_000,
+    film: bool = False,
+    bridges: bool = False,
+    motions: str = "normal",
+    reach: float = 1.0,
+    gpu: bool = False,
 ) -> ParticleSolver:
     """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
 
     motions  that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
     reach    of films over the reduced radius
+    gpu      steps on a graphics processor
     """
     centres, (width, depth) = positions(count)
     grains = make_particles(centres, 0.5 * DIAMETER, GRAIN.density, viscosity=1e-3 if film else 0.0)
@@ -85,6 +91,7 @@ def bed(
         laws=Laws(film=film, film_motions=motions, cutoff_ratio=reach, bridge=WATER if bridges else None),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),
+        settings=SolverSettings(gpu=gpu),
     )
 
 
@@ -115,10 +122,7 @@ def bench(
     bandwidth = triad_of_gpu() if gpu else triad(threads)
     use_threads(threads)
     films: dict[str, Any] = {"motions": "full" if full else "normal"}
-    before = use_gpu(None)
-    use_gpu(gpu)
-    runs = {"cfddem": bed(count, film or full, bridges, **films)}
-    use_gpu(before)
+    runs = {"cfddem": bed(count, film or full, bridges, gpu=gpu, **films)}
     if gpu:
         runs["the processor"] = bed(count)
     if film or full:

@@ -48,7 +48,9 @@ def triad_of_gpu(count: int = 50_000_000, repeats: int = 5) -> float:
     """The same of the graphics processor [bytes/s]."""
     from numba import cuda
 
-    from cfddem.backend.gpu import BLOCK
+    from cfddem.backend.gpu import BLOCK, name_of_gpu
+
+    name_of_gpu()  # refuses where there is none
 
     @cuda.jit
     def loop(a, b, c, s):  # type: ignore[no-untyped-def]

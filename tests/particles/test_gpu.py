@@ -6,26 +6,29 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cfddem import Laws, Material, ParticleSolver, SolverSettings, make_particles, pair_table
-from cfddem.backend.compile import use_gpu
+from cfddem import Case, Laws, Material, ParticleSolver, SolverSettings, make_particles, pair_table
+from cfddem.backend import gpu
 from cfddem.backend.errors import InputError
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.walls.meshes import Mesh
+from cfddem.preflight.summary import preflight
+from cfddem.run.resuming import require_compiled
 
 pytest.importorskip("numba.cuda", reason="the simulator is part of numba-cuda, and of older versions of numba")
 
 SYSTEM = """
 import sys
 import numpy as np
-from cfddem.backend.compile import use_gpu
 from cfddem.case.materials import Material
 from cfddem.particles.initial.packing import lattice
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Cylinder, Plane
 
@@ -39,20 +42,28 @@ size = 0.5e-3 * draw.uniform(0.97, 1.03, len(places))
 spheres = make_particles(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
                          spin=draw.normal(0, 50.0, places.shape), fixed=np.arange(len(places)) == 5)
 table = pair_table([glass])
-use_gpu(gpu)
 walls = [Plane(velocity=(0.1, 0.0, 0.0)),
          Cylinder(point=(2e-3, 0.0, 1.5e-3), axis=(0.0, 1.0, 0.0), radius=2.29e-3, spin=(0.0, 5.0, 0.0))]
-run = ParticleSolver(spheres, table.view(np.recarray) if gpu else table, walls=walls,
-                     laws=Laws(contact=contact, rolling=rolling), gravity=(0.0, 0.0, -9.81), box=(None, 4.0e-3, None))
+settings = SolverSettings(gpu=gpu, skin=2e-6)
+table = table.view(np.recarray) if gpu else table
+run = ParticleSolver(spheres, table, walls=walls, laws=Laws(contact=contact, rolling=rolling),
+                     gravity=(0.0, 0.0, -9.81), box=(None, 4.0e-3, None), settings=settings)
 spheres.applied[:] = 1e-7
 run.advance(1e-6, 15)
+assert run.lists.made > 0 and np.abs(run.edges.spring).max() > 0.0
+assert len(run.edges.first) > run.edges.between_particles > 50
+gone = run.remove(run.particles.id == 20)
+run.insert(make_particles(gone.position, 0.5e-3, 2500.0, velocity=(0.0, 0.0, -0.3)))
 made = run.lists.made
-spheres.velocity[7] += 0.3
 run.advance(1e-6, 5)
-assert np.abs(run.edges.spring).max() > 0.0 and len(run.edges.first) > run.edges.between_particles > 50
+assert run.lists.made > made
+alone = ParticleSolver(make_particles([[0.0, 0.0, 0.0], [0.99e-3, 0.0, 0.0]], 0.5e-3, 2500.0), table,
+                       laws=Laws(contact=contact, rolling=rolling), settings=settings)
+alone.advance(1e-6, 3)
+spheres = run.particles
 np.savez(path, position=spheres.position, velocity=spheres.velocity, spin=spheres.spin, force=spheres.force,
          torque=spheres.torque, edge_force=run.edges.force, edge_spring=run.edges.spring, walls=run.wall_force,
-         shift=run.walls.shift, lists=[made, run.lists.made])
+         shift=run.walls.shift, lists=[made, run.lists.made], alone=alone.particles.position)
 """
 
 
@@ -60,7 +71,7 @@ np.savez(path, position=spheres.position, velocity=spheres.velocity, spin=sphere
     "contact, rolling", [("hertz", "none"), pytest.param("jkr", "spring_dashpot", marks=pytest.mark.slow)]
 )
 def test_steps_on_a_gpu_have_the_bits_of_those_on_the_processor(contact: str, rolling: str, tmp_path: Path) -> None:
-    """48 spheres, one of them fixed, a sliding plane, a cylinder, a force from outside; 20 steps and new lists."""
+    """48 spheres, one of them fixed, a sliding plane and a turning cylinder, outside force, new lists, an insert."""
     states = {}
     for where, settings in (("processor", {}), ("gpu", {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"})):
         path = tmp_path / f"{where}.npz"
@@ -78,31 +89,53 @@ def test_steps_on_a_gpu_have_the_bits_of_those_on_the_processor(contact: str, ro
 GLASS = Material(density=2500.0, youngs_modulus=1e7, poisson=0.25)
 CORNERS = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
 FLOOR = Mesh(vertices=CORNERS, triangles=np.array([[0, 1, 2]]))
+WATER = BridgeLaws(viscosity=1e-3, surface_tension=0.072)
 
 
 @pytest.mark.parametrize(
     "others, words",
     [
         ({"laws": Laws(film=True)}, "films"),
+        ({"laws": Laws(bridge=WATER)}, "liquid bridges"),
         ({"walls": [FLOOR]}, "walls of triangles"),
-        ({"settings": SolverSettings(record=True)}, "a record of collisions"),
-        ({"settings": SolverSettings(energies=True)}, "an energy account"),
+        ({"settings": SolverSettings(record=True, gpu=True)}, "a record of collisions"),
+        ({"settings": SolverSettings(energies=True, gpu=True)}, "an energy account"),
     ],
 )
 def test_what_a_gpu_does_not_have_is_refused(others: dict, words: str) -> None:
-    use_gpu(True)
-    try:
-        with pytest.raises(InputError, match=f"gpu = '{words}': must be a run of dry contacts"):
-            ParticleSolver(make_particles([[0.0, 0.0, 1e-3]], 1e-3, 2500.0), pair_table([GLASS]), **others)
-    finally:
-        use_gpu(False)
+    settings = {"settings": SolverSettings(gpu=True), **others}
+    with pytest.raises(InputError, match=f"gpu = '{words}': must be a run of dry contacts"):
+        ParticleSolver(make_particles([[0.0, 0.0, 1e-3]], 1e-3, 2500.0), pair_table([GLASS]), **settings)
 
 
-def test_a_machine_without_a_gpu_is_told_what_is_missing() -> None:
-    """One line, with the remedy."""
-    from cfddem.backend.gpu import name_of_gpu
+DRY = Case.from_text(
+    """
+material.grain = {density = 2500, youngs_modulus = 1e7, poisson = 0.25}
+column = {width = 0.01, depth = 0.01, height = 0.02, cell = 2.5e-3}
+bed = {diameter = 1e-3, count = 10, start = "suspended"}
+run = {until = 0.001, gpu = true}
+"""
+)
 
-    try:
-        name_of_gpu()
-    except InputError as failure:
-        assert "cfddem[gpu]" in str(failure) and "\n" not in str(failure)
+
+@pytest.mark.parametrize("key, value", [("run.energy_budget", True), ("run.record_collisions", True)])
+def test_a_check_names_the_keys_that_a_gpu_does_not_know(key: str, value: Any) -> None:
+    assert not [issue for issue in preflight(DRY).issues if issue.key == "run.gpu"]
+    (issue,) = [issue for issue in preflight(DRY.with_(**{key: value})).issues if issue.key == "run.gpu"]
+    assert issue.severity == "error" and key in issue.reason
+
+
+@pytest.mark.parametrize(
+    "package, words", [(None, "pip install 'cfddem\\[gpu\\]'"), (object(), "no driver here.*see nvidia-smi")]
+)
+def test_a_machine_without_a_gpu_is_told_what_is_missing(package: Any, words: str, monkeypatch: Any) -> None:
+    """Before a bed is poured, in one line with the remedy: the package, or the driver."""
+
+    def no_device() -> None:
+        raise RuntimeError("no\ndriver here")
+
+    monkeypatch.setattr(gpu, "find_spec", lambda name: package)
+    monkeypatch.setattr(gpu.cuda, "get_current_device", no_device)
+    with pytest.raises(InputError, match=words) as refusal:
+        require_compiled(DRY)
+    assert "\n" not in str(refusal.value)
