@@ -215,10 +215,10 @@ def check_gpu(case: Case) -> Iterator[Issue]:
     surfaces = [f"wall.{number}" for number, wall in enumerate(case.wall) if not wall.form.exact]
     others = {
         "laws.lubrication": case.has_films,
-        "liquid": case.liquid is not None,
+        "liquid": bool(case.liquid),
         "run.energy_budget": case.run.energy_budget,
         "run.record_collisions": case.run.record_collisions,
-        "vessel.shape": case.vessel is not None and case.vessel.shape == "surface",
+        "vessel.shape": bool(case.vessel and case.vessel.shape == "surface"),
     } | dict.fromkeys(surfaces, True)
     keys = [key for key, is_there in others.items() if is_there]
     if case.run.gpu and keys:
