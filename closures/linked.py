@@ -117,17 +117,25 @@ def ways(library: type) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def compare_quickly(settings: type) -> None:
-    """Compare settings of a compilation by those that are set.
+    """Compare settings of a compilation by those that are set, and hash them by their kind.
 
-    The compiler compares them thousands of times for each loop, all fifty with their defaults: a twentieth of its time.
+    The compiler does both thousands of times for each loop, with all settings and their defaults: a tenth of its time.
     """
     compared: Any = settings.__eq__
 
     def equals(one: Any, other: Any) -> Any:
-        alike = type(one) is type(other) and hasattr(one, "_values") and one._values == other._values
-        return alike or compared(one, other)
+        if type(one) is not type(other) or not (hasattr(one, "_values") and hasattr(one, "options")):
+            return compared(one, other)
+        options, ours, theirs = one.options, one._values, other._values
+        return ours == theirs or all(
+            ours.get(name, options[name].default) == theirs.get(name, options[name].default)
+            for name in ours.keys() | theirs.keys()
+        )
 
-    settings.__eq__ = equals  # type: ignore[method-assign, assignment]
+    def hashed(one: Any) -> int:
+        return hash(type(one))  # the compiler, too, gives all of a kind the same
+
+    settings.__eq__, settings.__hash__ = equals, hashed  # type: ignore[method-assign, assignment]
 
 
 PART, CALLED = ways(JITCodeLibrary)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
 import rooms  # noqa: F401  tests import each other
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Read when NumPy is first imported. Two workers whose products of small matrices run on all cores wait for each other:
+they take five times the processor time."""
 
 LONGEST = (
     "test_gallery", "test_many_bridges", "test_wall_bridges", "test_bridges", "test_docs", "test_coupling_ranks",

@@ -330,8 +330,8 @@ class FilterKernel:
     def layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
         layered = np.empty((len(self._homes.of_layered), len(fields)))
-        fields = self._merged.equalise(np.array(fields, float, order="C")) if self.grid.walls else fields
-        loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
+        around = self.reach.spread(self._merged.equalise(fields))
+        loops.spread(self._homes.of_layered, around.reshape(len(fields), -1), layered)
         return layered
 
     def of_deposits(self, deposits: Array) -> Array:
@@ -349,9 +349,9 @@ class FilterKernel:
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
         if sweeps == 0:
-            return self._merged.equalise(np.array(fields, float, order="C"))
+            return np.array(self._merged.equalise(fields), float, order="C")
         (now, inside), (other, inside_other) = self._scratch(len(fields))
-        inside[:] = fields = self._merged.equalise(np.array(fields, float, order="C"))
+        inside[:] = fields = self._merged.equalise(fields)
         low, high = planes = self._planes(fields, sweeps)
         other[:, :low] = other[:, high + 1 :] = 0.0
         for _ in range(sweeps):

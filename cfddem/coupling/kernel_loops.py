@@ -169,11 +169,22 @@ def _deposit_rows(rows, values, unit, first, shares, corners, fields):
     """Add the values of some particles to their cells."""
     for n in rows:
         for s in range(first.shape[1]):
-            cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
+            cells, weights = _cells(first[n, s], corners), _weights(n, s, shares)
             for m in range(values.shape[1]):
-                part = values[n, m] * unit[m] / first.shape[1]
-                for corner in range(CORNERS):
-                    fields[cell + corners[corner], m] += np.int64(np.rint(weight(corner, a, b, c) * part))
+                _add(values[n, m] * unit[m] / first.shape[1], weights, cells, fields, m)
+
+
+@inline
+def _add(value, weights, cells, fields, m):
+    """Add the shares of a value to component m of the cells, in whole numbers."""
+    fields[cells[0], m] += np.int64(np.rint(weights[0] * value))
+    fields[cells[1], m] += np.int64(np.rint(weights[1] * value))
+    fields[cells[2], m] += np.int64(np.rint(weights[2] * value))
+    fields[cells[3], m] += np.int64(np.rint(weights[3] * value))
+    fields[cells[4], m] += np.int64(np.rint(weights[4] * value))
+    fields[cells[5], m] += np.int64(np.rint(weights[5] * value))
+    fields[cells[6], m] += np.int64(np.rint(weights[6] * value))
+    fields[cells[7], m] += np.int64(np.rint(weights[7] * value))
 
 
 @threaded
@@ -222,13 +233,9 @@ def gather_of_kinds(kinds, first, shares, corners, fields, values):
 
 @inline
 def _add_mean(n, share, weights, cells, fields, values):
-    """Add a share of the weighted means of all components; two by two, which is faster than one by one."""
-    count = values.shape[1]
-    for m in range(0, count - 1, 2):
+    """Add a share of the weighted means of all components."""
+    for m in range(values.shape[1]):
         values[n, m] += share * _mean(weights, cells, fields, m)
-        values[n, m + 1] += share * _mean(weights, cells, fields, m + 1)
-    if count % 2:
-        values[n, count - 1] += share * _mean(weights, cells, fields, count - 1)
 
 
 @threaded

@@ -36,7 +36,7 @@ class SingleCells:
         return deposits
 
     def equalise(self, fields: Array) -> Array:
-        """Fields (m, nz, ny, nx), made their means over the groups, in all cells of these."""
+        """Means of fields (m, nz, ny, nx) over the groups, in all cells of these, as other fields."""
         return fields
 
     def copy(self, fields: Array) -> Array:
@@ -59,30 +59,24 @@ class MergedCells(SingleCells):
         cells = replace(whole, solid=self._groups.small, walls=None)
         super().__init__(Block(cells, grid.division, grid.communicator) if isinstance(grid, Block) else cells)
         self._box: CutCells = cut_cells_of_box(whole, tuple(bool(axis) for axis in periodic))
-        self._at, self._total = self._groups.at, self._groups.total
-        self._open, self.shares = self._groups.volume.ravel()[self._at], np.ones(grid.shape)
-        self.shares.reshape(-1)[self._at] = self._total
+        at, total = self._groups.at, self._groups.total
+        self._open, self._one, self.shares = self._groups.volume.ravel()[at], np.ones(len(at)), np.ones(grid.shape)
+        self.shares.reshape(-1)[at] = total
 
     def share(self, deposits: Array) -> Array:
         """See `SingleCells.share`."""
-        return self._put(deposits, self._groups.copied(self._taken(deposits)) / self._total)
+        self._groups.put_copies(_flat(deposits), self._groups.total)
+        return deposits
 
     def equalise(self, fields: Array) -> Array:
         """See `SingleCells.equalise`."""
-        return self._put(fields, self._groups.summed(self._taken(fields) * self._open) / self._total)
+        means = np.array(fields, float, order="C")
+        self._groups.put_means(_flat(means), self._open)
+        return means
 
     def copy(self, fields: Array) -> Array:
         """See `SingleCells.copy`."""
-        return self._put(fields, self._groups.copied(self._taken(fields)))
-
-    def _taken(self, fields: Array) -> Array:
-        """Values of fields (m, nz, ny, nx) in the cells of groups (m, n)."""
-        return fields.reshape(len(fields), -1).take(self._at, axis=1)
-
-    def _put(self, fields: Array, values: Array) -> Array:
-        """Fields (m, nz, ny, nx), contiguous, given these values (m, n) in the cells of groups."""
-        for field, value in zip(fields, values):
-            field.reshape(-1)[self._at] = value
+        self._groups.put_copies(_flat(fields), self._one)
         return fields
 
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
@@ -94,6 +88,11 @@ class MergedCells(SingleCells):
             gate * np.minimum(halo.padded(grid.part(share)), most) for gate, share, most in zip(gates, apertures, least)
         )
         return x, y, z
+
+
+def _flat(fields: Array) -> Array:
+    """A view of fields (m, nz, ny, nx), contiguous, as (m, cells)."""
+    return fields.reshape(len(fields), -1)
 
 
 def merged_cells(grid: Grid, periodic: Any) -> SingleCells:

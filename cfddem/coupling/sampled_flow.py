@@ -252,11 +252,11 @@ class SharpFlowSampler(FlowSampler):
 
     def deposited(self, particles: Particles, cell_map: ParticleCellMap) -> Deposited:
         """See `FlowSampler.deposited`; both in one pass."""
-        kernel, volume = self.kernel, cell_map.volume[:, None]
-        cell = kernel.grid.cell_volume
-        fields = kernel.spread(
-            cell_map, np.hstack([volume, volume * particles.velocity]), np.array([1.0, cell, cell, cell])
-        )
+        kernel, cell = self.kernel, self.kernel.grid.cell_volume
+        values = np.column_stack([cell_map.volume, particles.velocity])
+        for momentum in values.T[1:]:
+            momentum *= cell_map.volume
+        fields = kernel.spread(cell_map, values, np.array([1.0, cell, cell, cell]))
         return Deposited(fields[0] / cell, fields[1:])
 
     def sample(self, particles: Particles, cell_map: ParticleCellMap, cells: Deposited, mean: Array) -> SampledFlow:

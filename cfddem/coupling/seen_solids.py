@@ -87,7 +87,12 @@ class SeenSolids:
 
     def averaged(self, values: Array) -> Array:
         """The same mean of values of the particles that `around` was called with (N, m)."""
-        mean: Array = self._summed(self._weights[:, None] * values) / self._sums[:, None]
+        weighted = values.copy()
+        for column in weighted.T:
+            column *= self._weights
+        mean = self._summed(weighted)
+        for column in mean.T:
+            column /= self._sums
         return mean
 
     def _summed(self, weighted: Array) -> Array:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -152,25 +152,47 @@ def _leave(position, axis, place, inward, shares, left):
 def solid_beside(axis: int, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
     """Own solid fraction beside a wall, by distance from it, over that far from walls (places,) [-]; see
     `flow_beside`."""
-    counts = np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
-    across, normal = [d for d in range(3) if d != axis], _Normal(int(counts[axis]), spacing[axis], True)
+    order = _normal_first(axis)
+    spaces, strengths = tuple(spacing[d] for d in order), tuple(strength[d] for d in order)
+    normal = _Normal(_cells_along(spaces)[0], spaces[0], True)
     solid = np.zeros(len(normal.weights))
-    for _, squares, weight in _waves_along(across, counts, spacing):
-        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * square for square, e in zip(squares, across))
-        modes = normal.smoothed(smoothing, strength[axis], sweeps)
+    for _, squares, weight in _waves_along(spaces, math.prod(spacing)):
+        modes = normal.smoothed(_left_across(squares, spaces, strengths), strengths[0], sweeps)
         solid += weight * (modes * normal.weights).sum(axis=1)  # local: of a table
     return solid / _alone(solid_table(spacing, strength, sweeps), len(solid), axis)
 
 
-def _waves_along(
-    across: list[int], counts: Array, spacing: tuple[float, ...]
-) -> Iterator[tuple[list[float], list[float], float]]:
-    """Waves along a wall: phase over a cell, squares of the wave number [1/m2], and weight in the sum [1/m3]."""
-    for numbers in product(*(range(counts[e] // 2 + 1) for e in across)):
-        waves = [2.0 * math.pi * n / counts[e] for n, e in zip(numbers, across)]
-        squares = [(2.0 * math.sin(0.5 * wave) / spacing[e]) ** 2 for wave, e in zip(waves, across)]
-        weight = math.prod(1.0 if 2 * n in (0, counts[e]) else 2.0 for n, e in zip(numbers, across))
-        yield waves, squares, weight / (math.prod(int(counts[e]) for e in across) * math.prod(spacing))
+Three = tuple[float, ...]
+"""One of each direction."""
+
+
+def _normal_first(axis: int) -> list[int]:
+    """The normal of a wall, and the two directions along it."""
+    return [axis, *(d for d in range(3) if d != axis)]
+
+
+def _cells_along(spaces: Three) -> list[int]:
+    """Number of cells along directions with these spacings [m]."""
+    return [round(CELLS * max(spaces) / space) for space in spaces]
+
+
+def _left_across(squares: list[float], spaces: Three, strengths: Three) -> float:
+    """What one sweep of the second stage leaves of a wave along a wall [-]."""
+    return 1.0 - sum(s * h**2 * square for square, h, s in zip(squares, spaces[1:], strengths[1:]))
+
+
+def _waves_along(spaces: Three, volume: float) -> Iterator[tuple[list[float], list[float], float]]:
+    """Waves along a wall: phase over a cell, squares of the wave number [1/m2], and weight in the sum [1/m3].
+
+    spaces  of the cells, normal to the wall first [m]
+    volume  of a cell [m3]
+    """
+    counts = _cells_along(spaces)[1:]
+    for numbers in product(*(range(count // 2 + 1) for count in counts)):
+        waves = [2.0 * math.pi * n / count for n, count in zip(numbers, counts)]
+        squares = [(2.0 * math.sin(0.5 * wave) / h) ** 2 for wave, h in zip(waves, spaces[1:])]
+        weight = math.prod(1.0 if 2 * n in (0, count) else 2.0 for n, count in zip(numbers, counts))
+        yield waves, squares, weight / (math.prod(counts) * volume)
 
 
 @lru_cache(maxsize=16)
@@ -182,13 +204,41 @@ def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tu
     spacing   of the cells [m]
     strength  of each sweep of the kernel's second stage along x, y, z
     """
-    free, counts = tables_of(spacing, strength, sweeps), np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
-    across, normal = [d for d in range(3) if d != axis], _Normal(int(counts[axis]), spacing[axis], slips)
+    order = _normal_first(axis)
+    spaces, strengths = tuple(spacing[d] for d in order), tuple(strength[d] for d in order)
     ends = (
-        min((2.0 * math.sin(math.pi / n) / h) ** 2 for n, h in zip(counts, spacing)),
+        min((2.0 * math.sin(math.pi / n) / h) ** 2 for n, h in zip(_cells_along(spacing), spacing)),
         sum(4.0 / h**2 for h in spacing),
     )
+    driven = _driven_flow(slips, spaces, strengths, sweeps, math.prod(spacing), ends)
+    flow = np.empty_like(driven)
+    flow[:, :, order] = driven
+    alone = _alone(tables_of(spacing, strength, sweeps).flow, len(flow), axis)
+    shares: Array = flow / np.moveaxis(alone, 1, 2)
+    return shares
+
+
+@lru_cache(maxsize=16)
+def _driven_flow(
+    slips: bool, spaces: Three, strengths: Three, sweeps: int, volume: float, ends: tuple[float, float]
+) -> Array:
+    """Flow that a force at a place drives there, normal to the wall and along it (places, MODES, 3).
+
+    Of cubic cells it is the same for all walls.
+
+    spaces, strengths  as of `flow_beside`, normal to the wall first
+    volume             of a cell [m3]
+    ends               least and largest rate over the viscosity [1/m2]
+    """
+    normal = _Normal(_cells_along(spaces)[0], spaces[0], slips)
     flow = np.zeros((len(normal.weights), MODES, 3))
+
+    @cache
+    def of_wave(square: float, smoothing: float) -> tuple[Array, ...]:
+        """Rates, and the flow normal to the wall and along it."""
+        modes = normal.smoothed(smoothing, strengths[0], sweeps)
+        rates, stream = normal.stokes(square)
+        return rates, math.sqrt(square) * modes @ normal.mean @ stream, modes @ normal.slope @ stream
 
     def add(d: int, driven: Array, rates: Array, weight: float) -> None:
         """Add the flow of eigenvectors that a force along d drives (places, n) at rates over the viscosity (n,)."""
@@ -196,23 +246,20 @@ def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tu
         for k in range(MODES):
             flow[:, k, d] += weight * (driven[:, mode == k] ** 2 / rates[mode == k]).sum(axis=1)  # local: of a table
 
-    for waves, squares, weight in _waves_along(across, counts, spacing):
-        square = sum(squares)
-        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * square for square, e in zip(squares, across))
-        modes = normal.smoothed(smoothing, strength[axis], sweeps)
+    for waves, squares, weight in _waves_along(spaces, volume):
+        square, smoothing = sum(squares), _left_across(squares, spaces, strengths)
+        modes = normal.smoothed(smoothing, strengths[0], sweeps)
         if square > 0.0:
-            rates, stream = normal.stokes(square)
-            add(axis, math.sqrt(square) * modes @ normal.mean @ stream, rates, weight)
-            lengthwise = modes @ normal.slope @ stream
-        for d, wave, along in zip(across, waves, squares):
+            rates, towards, lengthwise = of_wave(square, smoothing)
+            add(0, towards, rates, weight)
+        for d, wave, along in zip((1, 2), waves, squares):
             share, staggered = along / square if square > 0.0 else 0.0, weight * math.cos(0.5 * wave) ** 2
             if square > 0.0:
                 add(d, lengthwise, rates, staggered * share)
             apart = normal.rates + square
             moving = apart > 1e-9 * ends[0]  # all but the fluid as a whole, over a wall without friction
             add(d, (modes @ normal.vectors)[:, moving], apart[moving], staggered * (1.0 - share))
-    shares: Array = flow / np.moveaxis(_alone(free.flow, len(flow), axis), 1, 2)
-    return shares
+    return flow
 
 
 def _alone(table: Array, places: int, axis: int) -> Array:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
 from cfddem.backend.errors import InputError
+from cfddem.fluid import group_loops as loops
 from cfddem.fluid.block import owners
 from cfddem.fluid.cut_cells import CutCells, cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
@@ -107,17 +108,36 @@ class Groups:
         self._sent = {other: np.flatnonzero(of_own == other) for other in np.unique(of_own).tolist()}
         self._received = {other: np.flatnonzero(of_members == other) for other in np.unique(of_members).tolist()}
 
-    def summed(self, values: Array) -> Array:
-        """Sums over groups of values of the cells `at` (m, n), in all of these."""
-        members = self._exchanged(values, self._sent, self._received, len(self._group))
-        count = len(self._large)
-        return self._to_members(
-            np.array([np.bincount(self._group, weights=field, minlength=count) for field in members])
-        )
+    def put_means(self, fields: Array, shares: Array, at: NDArray[np.int64] | None = None) -> None:
+        """Make fields (m, cells), contiguous, their sums over groups over `total`, in all cells of these.
 
-    def copied(self, values: Array) -> Array:
-        """Values of the large cells of the cells `at`, of values of these (m, n)."""
-        return self._to_members(values[:, self._large])
+        shares  weights of the cells `at` in the sums (n,)
+        at      where the fields have these cells; as the grid if None
+        """
+        at, count = self.at if at is None else at, len(self._large)
+        if self._communicator.size == 1:
+            loops.put_means(at, self._group, count, shares, self.total, fields)
+            return
+        members = self._exchanged(fields.take(at, axis=1) * shares, self._sent, self._received, len(self._group))
+        sums = [np.bincount(self._group, weights=field, minlength=count) for field in members]
+        self._put(fields, self._to_members(np.array(sums)) / self.total, at)
+
+    def put_copies(self, fields: Array, divisor: Array, at: NDArray[np.int64] | None = None) -> None:
+        """Give all cells of groups the value of their large cell in fields (m, cells), contiguous, over a divisor (n,).
+
+        at  as in `put_means`
+        """
+        at = self.at if at is None else at
+        if self._communicator.size == 1:
+            loops.put_copies(at, at[self._large][self._group], divisor, fields)
+            return
+        self._put(fields, self._to_members(fields.take(at, axis=1)[:, self._large]) / divisor, at)
+
+    @staticmethod
+    def _put(fields: Array, values: Array, at: NDArray[np.int64]) -> None:
+        """Write values (m, n) into the cells `at` of fields (m, cells)."""
+        for field, value in zip(fields, values):
+            field[at] = value
 
     def _to_members(self, of_groups: Array) -> Array:
         """Values of groups whose large cell is here (m, groups), in the cells `at` of all ranks."""
@@ -173,6 +193,7 @@ class CutGroups(SingleCells):
         self._groups = Groups(grid, fluid.boundaries.periodic)
         self.volume = self._groups.volume
         self._at = grid.inner(np.arange(cut.volume.size).reshape(grid.padded_shape)).ravel()[self._groups.at]
+        self._whole = np.ones(len(self._at))
         faces = [np.flatnonzero(cut.aperture[d] < 1.0) for d in range(3)]
         self._cut_faces = [(at, cut.aperture[d].ravel()[at]) for d, at in enumerate(faces)]
         self._allow_for(cut, fluid.inverse_spacing)
@@ -186,7 +207,8 @@ class CutGroups(SingleCells):
             low[2 - d], high[2 - d] = slice(None, -1), slice(1, None)
             sums += faces[tuple(low)] + faces[tuple(high)]
         at, total = self._groups.at, self._groups.total
-        of_groups = self._groups.summed(sums.reshape(1, -1)[:, at])[0] / total
+        self._groups.put_means(sums.reshape(1, -1), self._whole)
+        of_groups = sums.ravel()[at]
         spread = self.spread.reshape(-1)
         spread[at] = np.maximum(spread[at], np.where(total == 1.0, 0.0, of_groups))
 
@@ -197,19 +219,16 @@ class CutGroups(SingleCells):
 
     def gather(self, sums: Array) -> None:
         """See `SingleCells.gather`."""
-        flat = sums.reshape(-1)
-        flat[self._at] = self._groups.summed(flat[None, self._at])[0] / self._groups.total
+        self._groups.put_means(sums.reshape(1, -1), self._whole, self._at)
 
     def copy(self, values: Array) -> None:
         """See `SingleCells.copy`."""
-        flat = values.reshape(-1)
-        flat[self._at] = self._groups.copied(flat[None, self._at])[0]
+        self._groups.put_copies(values.reshape(1, -1), self._whole, self._at)
 
     def averaged(self, cells: Array) -> Array:
         """See `SingleCells.averaged`."""
-        mean, at = np.array(cells, float), self._groups.at
-        flat = mean.reshape(-1)
-        flat[at] = self._groups.summed((self.volume * cells).reshape(1, -1)[:, at])[0] / self._groups.total
+        mean = np.array(cells, float, order="C")
+        self._groups.put_means(mean.reshape(1, -1), self.volume.ravel()[self._groups.at])
         return mean
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.targetconfig import Option, TargetConfig
 
 from cfddem.backend.compile import inline, part, prange, serial, threaded_part, use_threads
 from closures.linked import compare_quickly
@@ -148,17 +149,24 @@ def test_a_version_without_the_replaced_parts_gives_the_same_numbers(replaced: b
 
 
 def test_settings_are_compared_by_what_is_set_and_else_as_the_compiler_does() -> None:
-    class Settings:
-        asked = 0
-
-        def __init__(self, **values: int) -> None:
-            if values:
-                self._values = values
+    class Settings(TargetConfig):
+        level = Option(type=int, default=2, doc="")
+        fast = Option(type=bool, default=False, doc="")
 
         def __eq__(self, other: object) -> bool:
-            Settings.asked += 1
-            return self.__dict__ == other.__dict__
+            asked.append(other)
+            return super().__eq__(other) is True
 
+    def made(**values: int) -> Settings:
+        settings = Settings()
+        settings._values.update(values)
+        return settings
+
+    asked: list[object] = []
+    pairs = [({}, {"level": 2}), ({"level": 3}, {"level": 3}), ({"level": 3}, {}), ({"level": 3}, {"fast": True})]
+    alike = [made(**one) == made(**other) for one, other in pairs]
+    assert alike == [True, True, False, False] and len(asked) == 4
     compare_quickly(Settings)
-    assert Settings(level=3) == Settings(level=3) and Settings.asked == 0
-    assert Settings(level=3) != Settings(level=2) and Settings() == Settings() and Settings.asked == 2
+    assert alike == [made(**one) == made(**other) for one, other in pairs] and len(asked) == 4
+    assert len({hash(made(**values)) for pair in pairs for values in pair}) == 1
+    assert made() != 2 and len(asked) == 5
