@@ -1,7 +1,7 @@
 """What cells, kernel and fluid step cost in accuracy, as far as it was measured in beds of the validation.
 
-LIQUID and GAS are rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`). The other numbers are
-those of pages; no command computes them again, except those of a lattice. Another bed may differ from all of these.
+LIQUID are rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`). The other numbers are those of
+pages; no command computes them again, except those of a lattice. Another bed may differ from all of these.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Change(NamedTuple):
     name: str
     value: float
     error: float  # standard error
-    table: str  # of `docs/tables`
-    row: str  # that it is read from
+    table: str  # of `docs/tables`; "limits" is the one of gas beds in `docs/limits.md`
+    row: str  # that it is read from; in the limits with its column
     bed: str
     surface: str = "smeared"
 
@@ -48,7 +48,6 @@ class Change(NamedTuple):
 
 
 STEPS = "smooth, 1e+05 Pa: {}, fluid step over a tenth of it"
-FINER = "{} gas bed, cells finer by 1.5: {} over the reference run"
 
 LIQUID = (
     Change("tenth of fluid step: collisions", 1.002, 0.005, "bed-steps", STEPS.format("collisions of a sphere"),
@@ -60,13 +59,19 @@ LIQUID = (
 )  # fmt: skip
 """Beds in a liquid."""
 
+SMALL = ("small gas bed", "sharp")
+QUARTER, FINER = "0.125 ms, 2.40 d: {}", "0.5 ms, 1.71 d: {}"
+HEIGHT, DROP, DEVIATION = "mean height [mm]", "pressure drop over weight", "its deviation in time"
+
 GAS = (
-    Change("cells finer by 1.5: bed height", 0.997, 0.005, "beds", FINER.format("slugging", "height"), "slugging bed"),
-    Change("the same: pressure drop", 0.998, 0.004, "beds", FINER.format("slugging", "pressure drop"), "slugging bed"),
-    Change("the same: its deviation in time", 0.77, 0.039, "beds",
-           FINER.format("slugging", "standard deviation of the pressure"), "slugging bed"),
-)  # fmt: skip
-"""Beds in a gas."""
+    Change("quarter of fluid step: bed height", 0.995, 0.0045, "limits", QUARTER.format(HEIGHT), *SMALL),
+    Change("the same: pressure drop", 1.0, 0.0024, "limits", QUARTER.format(DROP), *SMALL),
+    Change("the same: its deviation in time", 0.982, 0.024, "limits", QUARTER.format(DEVIATION), *SMALL),
+    Change("cells finer by 1.4: bed height", 0.97, 0.0049, "limits", FINER.format(HEIGHT), *SMALL),
+    Change("the same: pressure drop", 1.019, 0.0065, "limits", FINER.format(DROP), *SMALL),
+    Change("the same: its deviation in time", 0.889, 0.012, "limits", FINER.format(DEVIATION), *SMALL),
+)
+"""Beds in a gas: one of 2 000 seeds of the case `gas-bed`, 12 diameters high."""
 
 
 def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tuple[str, float, str, str]]:

@@ -20,11 +20,11 @@ from cfddem.run import history
 from cfddem.run.simulation import Simulation
 from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
-from closures.drag import ergun
+from closures.drag import di_felice, ergun
 from closures.numbers import archimedes
 from scenarios.beds.defluidisation.study import onsets
 from scenarios.beds.gas_bed import mueller, standard_bed, van_wachem
-from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_box
+from scenarios.beds.sedimentation.study import NARROW, Settling, between_walls, exponent, in_periodic_box, vessel
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
 from scenarios.beds.spouted_bed import profiles
@@ -73,6 +73,21 @@ def test_standard_bed_is_as_described() -> None:
 def test_exponent_of_an_exact_power_law() -> None:
     known = [Settling(solids, 0.08 * (1.0 - solids) ** 3.2, 0.08) for solids in (0.05, 0.2, 0.4)]
     assert exponent(known) == pytest.approx((3.2, 0.08), rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cell", [NARROW["column.cell"], 5e-3 / 3.0])
+def test_the_boundary_of_a_suspension_falls_as_its_drag_law_says(cell: float) -> None:
+    """With smeared surfaces it is 2 to 5 % slower: a dense layer lies over a gap there."""
+    case = vessel()
+    fluid = case.required_fluid
+    law = fluidising_velocity(case.bed.diameter, 2560.0, fluid.density, fluid.viscosity, 0.8, di_felice)
+    sharp, smeared = (
+        between_walls(0.2, changes=NARROW | {"column.cell": cell, "laws.surface": surface}).velocity
+        for surface in ("sharp", "smeared")
+    )
+    assert sharp == pytest.approx(law, rel=0.01)
+    assert 0.95 * law < smeared < 0.98 * law
 
 
 def exact_ramp() -> tuple[Case, dict[str, np.ndarray], float]:

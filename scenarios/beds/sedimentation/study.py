@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,15 @@ EDGE, HEIGHT = 16, 32
 
 BOUNDARY = 0.95
 """Share of the spheres below the upper boundary; above, the suspension is too diffuse."""
+
+
+NARROW: dict[str, Any] = {
+    "column.width": 5e-3,
+    "column.height": 25e-3,
+    "column.sides": "periodic",
+    "column.cell": 1.25e-3,
+}
+"""Changes that make the vessel ten diameters wide, without walls at its sides."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +96,14 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, di
     return Settling(solids, float(np.mean(falls[rows // 2 :])), speed)
 
 
-def between_walls(solid_fraction: float, *, fall: float = 0.45) -> Settling:
+def between_walls(solid_fraction: float, *, fall: float = 0.45, changes: Mapping[str, Any] | None = None) -> Settling:
     """Let the spheres of the case settle in the closed vessel.
 
     solid_fraction  at the start [-]
     fall            approximate fall of the boundary over the height; the first third is not fitted
+    changes         to the case, such as :data:`NARROW`
     """
-    case = vessel()
+    case = vessel().with_(**(changes or {}))
     volume = math.pi / 6.0 * case.bed.diameter**3
     count = round(solid_fraction * math.prod(case.column.size) / volume)
     simulation = Simulation(case.with_(**{"bed.count": count}))
