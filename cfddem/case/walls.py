@@ -231,8 +231,8 @@ def _refuse_misfits(name: str, kind: type[Wall], keys: dict[str, Any]) -> None:
         raise InputError(
             "shape", name, f"a name that no other shape has, beside {', '.join(SHAPES)}", "take another one"
         )
-    own, others = _keys_of(kind), {key for each in SHAPES if each != name for key in _keys_of(SHAPES[each])}
-    for key in [each for each in own if each not in keys and each not in OF_EVERY_CASE | others]:
+    own, others = _keys_of(kind), {key for shape in SHAPES if shape != name for key in _keys_of(SHAPES[shape])}
+    for key in sorted({*own} - {*keys} - OF_EVERY_CASE - others):
         remedy = f'add {key}=Annotated[float, Field(description="... [m]")]'
         raise InputError(f"shape.{name}.{key}", None, "described in register", remedy)
     for key, annotation in keys.items():
