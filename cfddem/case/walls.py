@@ -199,13 +199,21 @@ class CaseWall(Checked):
             raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None
 
 
+OF_EVERY_CASE = frozenset(CaseWall.model_fields)
+"""Keys that no shape of a user brings."""
+
+
 def register(name: str, kind: type[Wall], **keys: Any) -> None:
     """Let cases have a shape of a user by its name, as `shape = "ring"`.
 
     name  in cases
     kind  class of the wall, whose fields are keys of the case
     keys  type and description of those that no other shape has: `Annotated[float, Field(gt=0, description="... [m]")]`
+
+    errors  InputError for a name that another class has, a key of the class that is not described, and a key that is
+            no field of the class or belongs to another shape; nothing is registered then
     """
+    _refuse_misfits(name, kind, keys)
     SHAPES[name] = kind
     for key, annotation in keys.items():
         description = FieldInfo.from_annotation(annotation).description
@@ -214,6 +222,27 @@ def register(name: str, kind: type[Wall], **keys: Any) -> None:
         )
         CaseWall.__annotations__[key] = annotation | None
     _declare()
+
+
+def _refuse_misfits(name: str, kind: type[Wall], keys: dict[str, Any]) -> None:
+    """Refuse what `register` cannot take. A class that is defined again, as in a notebook, may replace itself."""
+    before = SHAPES.get(name, kind)
+    if (before.__module__, before.__qualname__) != (kind.__module__, kind.__qualname__):
+        raise InputError(
+            "shape", name, f"a name that no other shape has, beside {', '.join(SHAPES)}", "take another one"
+        )
+    own, others = _keys_of(kind), {key for shape in SHAPES if shape != name for key in _keys_of(SHAPES[shape])}
+    for key in sorted({*own} - {*keys} - OF_EVERY_CASE - others):
+        remedy = f'add {key}=Annotated[float, Field(description="... [m]")]'
+        raise InputError(f"shape.{name}.{key}", None, "described in register", remedy)
+    for key, annotation in keys.items():
+        if key not in own:
+            raise InputError(f"shape.{name}.{key}", None, f"a field of {kind.__name__}, {', '.join(own)}")
+        if key in OF_EVERY_CASE | others:
+            raise InputError(f"shape.{name}.{key}", None, "left out of register", "other shapes have this key already")
+        if not FieldInfo.from_annotation(annotation).description:
+            remedy = 'give it as Annotated[float, Field(description="... [m]")]'
+            raise InputError(f"shape.{name}.{key}", None, "described in register", remedy)
 
 
 def forget_shape(name: str) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.kernel_loops import weight
+from cfddem.coupling.kernel_loops import gather, weight
 from cfddem.coupling.self_disturbance_tables import MODES, lattice_of
 from cfddem.coupling.self_disturbance_walls import PLACES, flow_beside
 from cfddem.fluid.cut_cells import contents
@@ -35,8 +35,30 @@ LEAST = 1e-12
 APART = 6
 """Distance in cells at which a cell no longer gathers from another one, at most."""
 
+NEVER = 1000
+"""Numbers of cells after which an axis that is not periodic begins again: more than there are."""
+
 NEIGHBOURS = tuple(product((-1, 0, 1), repeat=3))
 """Steps along z, y, x from a cell to itself and its neighbours."""
+
+
+class ConstantFields:
+    """Fields of cells that do not change, laid out for particles to gather them.
+
+    kernel  of the run
+    fields  (m, nz, ny, nx)
+    """
+
+    def __init__(self, kernel: FilterKernel, fields: Array) -> None:
+        self._kernel, self._fields = kernel, np.ascontiguousarray(fields)
+        self._reach, self._layered = kernel.reach, kernel.layered(self._fields)
+
+    @property
+    def layered(self) -> Array:
+        """In the cells that particles reach now, see `FilterKernel.layered`; they change where space is cut anew."""
+        if self._reach is not self._kernel.reach:
+            self._reach, self._layered = self._kernel.reach, self._kernel.layered(self._fields)
+        return self._layered
 
 
 class WallsOfCells:
@@ -60,12 +82,14 @@ class WallsOfCells:
             towards += weight * roots[:, axis]
             along += weight * 0.5 * (roots.sum(axis=1) - roots[:, axis])  # local: three components
         fields = np.concatenate([towards, along, normal]).reshape(-1, *whole.shape)
-        self._kernel, self._fields = kernel, np.ascontiguousarray(kernel.grid.part(fields))
+        self._kernel, self._fields = kernel, ConstantFields(kernel, kernel.grid.part(fields))
 
     def left(self, position: Array, flow: Array) -> Array:
         """The modes of flows (N, MODES, 3) that particles at these places (N, 3) [m] drive or gather, beside walls."""
-        kernel = self._kernel
-        values = kernel.gather(kernel.stencil(position, np.zeros(len(position))), self._fields)
+        kernel, stencil = self._kernel, self._kernel.stencil(position, np.zeros(len(position)))
+        layered = self._fields.layered
+        values = np.empty((len(position), layered.shape[1]))
+        gather(*stencil, kernel.corners, layered, values)
         towards, along, normal = values[:, :MODES], values[:, MODES : 2 * MODES], values[:, 2 * MODES :]
         x, y, z = normal.T
         normal = normal / np.sqrt(np.maximum(x * x + y * y + z * z, LEAST))[:, None]
@@ -86,13 +110,16 @@ class SolidsOfCells:
         numbers = np.indices(kernel.grid.whole.shape, dtype=float)[::-1]  # along x, y, z
         place = kernel.of_large_cells(kernel.grid.part(numbers))
         exchanged = kernel.of_large_cells(_exchanged(kernel, passes, kind))
-        self._kernel, self._fields = kernel, np.concatenate([place, exchanged])
+        self._kernel, self._fields = kernel, ConstantFields(kernel, np.concatenate([place, exchanged]))
+        counts = np.array(kernel.grid.whole.cells, float)
+        self._periods = np.where(kernel.periodic, counts, NEVER * counts)
 
     def of(self, position: Array, volume: Array) -> Array:
         """Of particles at these places (N, 3) [m] with these volumes (N,) [m3]; (N,) [-]."""
         kernel, own = self._kernel, np.empty(len(volume))
         stencil = kernel.stencil(position, np.zeros(len(position)))
-        _pairs(stencil, kernel.corners, kernel.layered(self._fields), volume / kernel.grid.cell_volume, own)
+        share = volume / kernel.grid.cell_volume
+        _pairs(stencil, kernel.corners, self._fields.layered, self._periods, share, own)
         return own
 
 
@@ -144,19 +171,20 @@ def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
 
 
 @inline
-def _step(here, there):
-    """From a number of cells to another one: -1, 0 or 1; over a periodic side the other way round."""
+def _step(here, there, period):
+    """From a number of cells to the nearest image of another one, after so many cells: -1, 0 or 1."""
     apart = there - here
-    step = 1 if apart > 0.5 else (-1 if apart < -0.5 else 0)
-    return step if abs(apart) < 3.5 else -step
+    apart -= period * np.rint(apart / period)
+    return 1 if apart > 0.5 else (-1 if apart < -0.5 else 0)
 
 
 @threaded
-def _pairs(stencil, corners, around, volume, own):
+def _pairs(stencil, corners, around, periods, volume, own):
     """Sum over pairs of the cells of each particle.
 
-    around  of cells: number along x, y, z of the large cell, and what it gathers of `NEIGHBOURS` (cells, 3 + 27)
-    volume  over that of a cell (N,)
+    around   of cells: number along x, y, z of the large cell, and what it gathers of `NEIGHBOURS` (cells, 3 + 27)
+    periods  cells after which x, y, z begin again (3,)
+    volume   over that of a cell (N,)
     """
     for n in prange(len(volume)):
         total, first = 0.0, stencil.first[n, 0]
@@ -165,6 +193,7 @@ def _pairs(stencil, corners, around, volume, own):
             here = around[first + corners[i]]
             for j in range(8):
                 there = around[first + corners[j]]
-                x, y, z = _step(here[0], there[0]), _step(here[1], there[1]), _step(here[2], there[2])
+                x, y = _step(here[0], there[0], periods[0]), _step(here[1], there[1], periods[1])
+                z = _step(here[2], there[2], periods[2])
                 total += weight(i, a, b, c) * weight(j, a, b, c) * here[3 + 9 * (z + 1) + 3 * (y + 1) + x + 1]
         own[n] = volume[n] * total

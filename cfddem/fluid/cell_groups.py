@@ -215,7 +215,7 @@ class CutGroups(SingleCells):
     def shut(self, flux: Array) -> None:
         """See `SingleCells.shut`."""
         for component, (at, share) in zip(flux, self._cut_faces):
-            shut(at, share, component)
+            shut(at, share, component.reshape(-1))
 
     def gather(self, sums: Array) -> None:
         """See `SingleCells.gather`."""

@@ -51,6 +51,7 @@ class Faces(NamedTuple):
     """
 
     axis: int
+    steps: Any  # (3,) to the next face along x, y, z
     place: Any  # (blocks, width) the faces, less two planes
     pattern: Any  # (blocks,)
     share: Array  # (patterns, width) of the momentum cell that is open
@@ -102,21 +103,24 @@ class NearWalls(NoWalls):
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """See `NoWalls.replace`; `fields.flux`, that of the velocity, becomes that through the open parts of faces."""
-        flux = self.fields.flux
+        flux, u, rate = (field.reshape(3, -1) for field in (self.fields.flux, velocity, force))
         for e, (at, share) in enumerate(self._cut):
             shut(at, share, flux[e])
         for d, faces in enumerate(self.components):
-            cut_transport(faces, velocity[d], flux, viscosity, density, central, force[d])
+            cut_transport(faces, u[d], flux, viscosity.reshape(-1), density, central, rate[d])
 
     def hold(self, new: Array, density: float, model_b: float, step: float, weight: float) -> None:
         """See `NoWalls.hold`."""
         fields = self.fields
-        for d, faces in enumerate(self.components):
-            velocities = fields.velocity[d], fields.stage_velocity[d], new[d]
+        old, stage, after, mobility = (
+            field.reshape(3, -1) for field in (fields.velocity, fields.stage_velocity, new, fields.mobility)
+        )
+        viscosity, voidage = fields.effective_viscosity.reshape(-1), fields.centred_voidage.reshape(-1)
+        for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
+            velocities = old[d], stage[d], after[d]
             hold_near_walls(
-                faces, fields.effective_viscosity, fields.centred_voidage, velocities, fields.mobility[d],
-                self._resistance[d], (density, model_b), (step, weight),
-            )  # fmt: skip
+                faces, viscosity, voidage, velocities, mobility[d], resistance, (density, model_b), (step, weight)
+            )
 
     def add_held(self, density: float, step: float, force: Array) -> None:
         """See `NoWalls.add_held`."""
@@ -195,7 +199,7 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
         return np.ascontiguousarray(np.moveaxis(values[..., fill[first]], -2, 0))
 
     return Faces(
-        d, place.astype(np.uint32)[fill], pattern, of_patterns(acting), of_patterns(weight),
+        d, np.array(steps), place.astype(np.uint32)[fill], pattern, of_patterns(acting), of_patterns(weight),
         of_patterns(constant) if constant.any() else np.zeros((0, 3, 2, fill.shape[1])), of_patterns(further),
         of_patterns(beside), of_patterns(pull), place[is_stiff].astype(np.uint32), stiff[is_stiff], inverse,
     )  # fmt: skip

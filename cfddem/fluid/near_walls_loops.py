@@ -1,6 +1,7 @@
 """Loops over the faces near smooth walls: convection and viscous stress of cut momentum cells, and their stiff part.
 
-Faces are taken in blocks, along each direction in turn, so that several are computed at once.
+Faces are taken in blocks, along each direction in turn, so that several are computed at once. All fields are flat when
+a loop takes them: of one that is reshaped within it the compiler does not know what memory it shares with others.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import prange, threaded, vector_inline
-from cfddem.fluid.momentum import carried, implicitness, strides
+from cfddem.fluid.momentum import carried, implicitness
 
 FULL = 0.5
 """Share of a momentum cell below which its convection acts on so much fluid."""
@@ -22,8 +23,7 @@ BLOCK = 64
 
 @threaded
 def shut(at, share, flux):
-    """Take the open parts of some faces from the flux through all of them, a padded component."""
-    flux = flux.reshape(-1)
+    """Take the open parts of some faces from the flux through all of them, a padded component, flat."""
     for n in prange(at.size):
         flux[at[n]] *= share[n]
 
@@ -36,9 +36,7 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
     velocity   padded component; flux (3, ...) eps u times the open share of a face; viscosity eps mu of cells
     rate       written
     """
-    steps = strides(viscosity.shape)
-    u, mu, out, flux = velocity.reshape(-1), viscosity.reshape(-1), rate.reshape(-1), flux.reshape(3, -1)
-    width = faces.place.shape[1]
+    steps, u, mu, width = faces.steps, velocity, viscosity, faces.place.shape[1]
     for block in prange(len(faces.place)):
         pattern, terms, sums = faces.pattern[block], np.empty((8, width)), np.zeros((3, width))
         _gather(faces, block, pattern, steps, u, mu, terms)
@@ -49,7 +47,7 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
                 _take_edges(faces, block, (steps[e], steps[faces.axis]), 2 * steps[2], flux[e], mu, terms)
             _balance(faces, (block, pattern, e), steps, u, central, terms, sums)
         _per_volume(faces, pattern, terms, density, sums)
-        place, within = faces.place[block], out[2 * steps[2] :]
+        place, within = faces.place[block], rate[2 * steps[2] :]
         for i in range(width):
             within[place[i]] = sums[0, i]
 
@@ -70,7 +68,7 @@ def _gather(faces, block, pattern, steps, u, mu, terms):
 def _take_centres(faces, block, step, first, flux, terms):
     """Write viscosity and flux on the momentum faces of a block along its own axis, which are centres of cells."""
     at, low, here, high = faces.place[block], flux[first - step :], flux[first:], flux[first + step :]
-    m_left, m_right, m_low, m_high, inward, outward = terms[2:]
+    m_left, m_right, m_low, m_high, inward, outward = terms[2], terms[3], terms[4], terms[5], terms[6], terms[7]
     for i in range(at.size):
         p = at[i]
         m_low[i], m_high[i] = m_left[i], m_right[i]
@@ -85,7 +83,7 @@ def _take_edges(faces, block, steps, first, flux, mu, terms):
     f_right_low, f_right_high = flux[first:], flux[first + step :]
     m_left_low, m_left_high = mu[first - back - step :], mu[first - back + step :]
     m_right_low, m_right_high = mu[first - step :], mu[first + step :]
-    m_left, m_right, m_low, m_high, inward, outward = terms[2:]
+    m_left, m_right, m_low, m_high, inward, outward = terms[2], terms[3], terms[4], terms[5], terms[6], terms[7]
     for i in range(at.size):
         p, beside = at[i], m_left[i] + m_right[i]
         m_low[i] = 0.25 * (m_left_low[p] + m_right_low[p] + beside)
@@ -96,7 +94,7 @@ def _take_edges(faces, block, steps, first, flux, mu, terms):
 @vector_inline
 def _balance(faces, which, steps, u, central, terms, sums):
     """Add the parts of both momentum faces of a block along e: stress, convection, growth of the fluid."""
-    stress, away, growth = sums
+    stress, away, growth = sums[0], sums[1], sums[2]
     block, pattern, e = which
     at, step, first = faces.place[block], steps[e], 2 * steps[2]
     low2, low, high, high2 = u[first - 2 * step :], u[first - step :], u[first + step :], u[first + 2 * step :]
@@ -123,7 +121,7 @@ def _balance(faces, which, steps, u, central, terms, sums):
 @vector_inline
 def _per_volume(faces, pattern, terms, density, sums):
     """Take the pull of the wall into the stress of a block, and convection and growth per volume."""
-    stress, away, growth = sums
+    stress, away, growth = sums[0], sums[1], sums[2]
     here, farther, left, right = terms[0], terms[1], terms[2], terms[3]
     share, own, other = faces.share[pattern], faces.pull[pattern, 0], faces.pull[pattern, 1]
     constant = faces.pull[pattern, 2]
@@ -144,11 +142,9 @@ def hold_near_walls(faces, viscosity, voidage, velocities, mobility, resistance,
     fluid       its density [kg/m3], and 1 in model B
     step        [s], and the weight of the stress of the stage before, 0 in the first stage
     """
-    steps = strides(voidage.shape)
-    back, first = steps[faces.axis], 2 * steps[2]
+    back, first = faces.steps[faces.axis], 2 * faces.steps[2]
     old, stage, new = velocities
-    old, stage, new = old.reshape(-1)[first:], stage.reshape(-1)[first:], new.reshape(-1)[first:]
-    mobility, mu, eps = mobility.reshape(-1)[first:], viscosity.reshape(-1), voidage.reshape(-1)
+    old, stage, new, mobility, mu, eps = old[first:], stage[first:], new[first:], mobility[first:], viscosity, voidage
     count = faces.stiff_at.size
     for block in prange((count + BLOCK - 1) // BLOCK):
         begin, end = block * BLOCK, min((block + 1) * BLOCK, count)
@@ -173,7 +169,7 @@ def _resist(at, stiff, mu_left, mu_right, resistance):
 def _held(at, fields, resistance, fluid, step, results):
     """Write velocity and mobility of a block."""
     (eps_left, eps_right, old, stage, new, mobility), (density, model_b), (step, weight) = fields, fluid, step
-    velocity, lost = results
+    velocity, lost = results[0], results[1]
     for i in range(at.size):
         p, stiffness = at[i], resistance[i]
         at_face, before, moved = 0.5 * (eps_right[p] + eps_left[p]), old[p], mobility[p]

@@ -6,9 +6,12 @@ import math
 
 import numpy as np
 
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import prange, threaded, vector_inline
 from cfddem.fluid.grid import HIGH, LOW, UNIT, Array, Grid
 from cfddem.fluid.halo import Halo
+
+BLOCK = 64
+"""Solid cells whose means are found together."""
 
 
 @threaded
@@ -41,23 +44,31 @@ def eddy_viscosity(velocity, factor, inverse, viscosity):
 
 
 @threaded
-def take_means(cells, neighbours, shares, values):
-    """Write the weighted mean of the 26 neighbours of some cells, none of which has a weight."""
-    flat = values.reshape(-1)
-    for n in prange(cells.size):
-        near, share = neighbours[n], shares[n]
-        a = b = c = d = e = f = g = h = 0.0
-        for m in range(0, 24, 8):  # eight sums, in the order in which numpy adds
-            a += flat[near[m]] * share[m]
-            b += flat[near[m + 1]] * share[m + 1]
-            c += flat[near[m + 2]] * share[m + 2]
-            d += flat[near[m + 3]] * share[m + 3]
-            e += flat[near[m + 4]] * share[m + 4]
-            f += flat[near[m + 5]] * share[m + 5]
-            g += flat[near[m + 6]] * share[m + 6]
-            h += flat[near[m + 7]] * share[m + 7]
-        total = ((a + b) + (c + d)) + ((e + f) + (g + h))
-        flat[cells[n]] = total + flat[near[24]] * share[24] + flat[near[25]] * share[25]
+def take_means(cells, steps, shares, values):
+    """Write the weighted mean of the 26 neighbours of some cells, none of which has a weight.
+
+    cells   (n,) flat index of the first neighbour of each; steps (26,) from this one to all
+    shares  (26, n) weights
+    values  a padded field, flat
+    """
+    for block in prange((cells.size + BLOCK - 1) // BLOCK):
+        begin, end = block * BLOCK, min((block + 1) * BLOCK, cells.size)
+        of_block, sums = cells[begin:end], np.zeros((8, end - begin))
+        for m in range(24):  # eight sums, in the order in which numpy adds
+            _add_neighbour(of_block, values[steps[m] :], shares[m, begin:end], sums[m % 8])
+        middle, near, last = steps[25] // 2, values[steps[24] :], values[steps[25] :]
+        for i in range(of_block.size):
+            at, a, b, c, d = of_block[i], sums[0, i], sums[1, i], sums[2, i], sums[3, i]
+            e, f, g, h = sums[4, i], sums[5, i], sums[6, i], sums[7, i]
+            total = ((a + b) + (c + d)) + ((e + f) + (g + h))
+            values[at + middle] = total + near[at] * shares[24, begin + i] + last[at] * shares[25, begin + i]
+
+
+@vector_inline
+def _add_neighbour(at, values, shares, sums):
+    """Add one neighbour of each cell of a block."""
+    for i in range(at.size):
+        sums[i] += values[at[i]] * shares[i]
 
 
 class EffectiveViscosity:
@@ -96,13 +107,12 @@ class EffectiveViscosity:
         else:
             np.multiply(voidage, viscosity, out=effective)
         if self._rim is not None:
-            cells, neighbours, shares = self._rim
-            take_means(cells, neighbours, shares, effective)
+            take_means(*self._rim, effective.reshape(-1))
             self.halo.fill(effective)
 
 
 def _rim(grid: Grid, halo: Halo) -> tuple[np.ndarray, np.ndarray, Array] | None:
-    """Solid cells that touch open ones: indices in a flat padded field, those of their 26 neighbours, weights."""
+    """Solid cells that touch open ones, as `take_means` takes them: first neighbours, steps from these, weights."""
     if grid.whole.solid is None:
         return None
     is_open = halo.padded(grid.open, outside=0.0)
@@ -114,4 +124,5 @@ def _rim(grid: Grid, halo: Halo) -> tuple[np.ndarray, np.ndarray, Array] | None:
     shares = is_open.ravel()[neighbours]
     total = shares.sum(axis=1)
     touching = total > 0.0
-    return cells[touching], neighbours[touching], shares[touching] / total[touching, None]
+    shares = np.ascontiguousarray((shares[touching] / total[touching, None]).T)
+    return neighbours[touching, 0].astype(np.uint32), steps - steps[0], shares

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import make_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
 from command_line import call
+from pydantic import Field
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
-from cfddem.case.walls import forget_shape
+from cfddem.case.walls import SHAPES, CaseWall, forget_shape, register
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
@@ -94,6 +96,36 @@ def test_every_part_of_the_package_knows_the_shape(page: dict[str, Any]) -> None
     assert in_fluid.thin_walls == case.wall and grid_of(in_fluid).walls
     drawn = len(case_drawing(case).axes[0].patches)
     assert drawn == len(case_drawing(case.with_(wall=[])).axes[0].patches) + 96
+
+
+def test_what_does_not_fit_is_refused_before_anything_changes(page: dict[str, Any]) -> None:
+    """A taken name; a key without description, which no class has, or which other shapes have. One line each."""
+    described = Annotated[float, Field(gt=0, description="inner radius [m]")]
+    disc = make_dataclass("Disc", [("thickness", float)], bases=(page["Ring"],), frozen=True, kw_only=True)
+    for name, keys, message in (
+        ("plane", {}, "shape = 'plane': must be a name that no other shape has"),
+        ("ring", {"thickness": described}, "shape = 'ring': must be a name that no other shape has"),
+        ("disc", {}, r"shape\.disc\.thickness: must be described in register; add thickness=Annotated"),
+        ("disc", {"thickness": float}, r"shape\.disc\.thickness: must be described in register; give it as"),
+        ("disc", {"thickness": described, "thick": described}, r"shape\.disc\.thick: must be a field of Disc, .*outer"),
+        ("disc", {"thickness": described, "inner": described}, r"shape\.disc\.inner: must be left out of register"),
+        ("disc", {"thickness": described, "point": described}, r"shape\.disc\.point: must be left out of register"),
+    ):
+        with pytest.raises(InputError, match=message) as refused:
+            register(name, disc, **keys)
+        assert "\n" not in str(refused.value)
+    assert "disc" not in SHAPES and "thickness" not in CaseWall.model_fields and SHAPES["ring"] is page["Ring"]
+    register("disc", disc, thickness=described)
+    forget_shape("disc")
+    assert page["case"].with_(wall=page["case"].wall) == page["case"]
+
+
+def test_a_class_that_is_defined_again_replaces_itself(page: dict[str, Any]) -> None:
+    """As where a cell of a notebook is run twice."""
+    again: dict[str, Any] = {}
+    exec(SHAPE, again)
+    exec(CASE, again)
+    assert SHAPES["ring"] is again["Ring"] is not page["Ring"]
 
 
 def test_a_surface_is_written_as_it_is_read(tmp_path: Path) -> None:

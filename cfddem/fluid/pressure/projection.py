@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
-from cfddem.backend.compile import inline, prange, threaded
+from cfddem.backend.compile import inline, prange, threaded, vector_inline
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.fields import CellFields
@@ -110,6 +110,22 @@ def open_cell(shares, k, j, i):
     return shares[1][k, j, i]
 
 
+@inline
+def through(flow, shares, d, low, high, x):
+    """Open share of the face normal to d times its voidage; low and high are the first of two rows of cells, x the
+    place in these."""
+    (k, j, i), (low_k, low_j, low_i) = high, low
+    voidage = 0.5 * (flow.voidage[low_k, low_j, low_i + x] + flow.voidage[k, j, i + x])
+    return voidage * open_face(shares, d, k, j, i + x)
+
+
+@inline
+def coefficient(flow, shares, d, low, high, x):
+    """Coefficient of the face normal to d, see `through`."""
+    k, j, i = high
+    return through(flow, shares, d, low, high, x) * flow.mobility[d, k, j, i + x] * flow.areas[d] * flow.inverse[d]
+
+
 @threaded
 def assemble(flow, shares, fresh, equation):
     """Right-hand side of the pressure equation and, if fresh, its coefficients.
@@ -118,49 +134,76 @@ def assemble(flow, shares, fresh, equation):
     shares    of faces and cells that smooth walls leave open; none without walls
     equation  ax, ay, az, anchor and b, all (nz, ny, nx)
     """
+    ax, ay, az, anchor, b = equation
     nz, ny, nx = flow.open_cells.shape
     for k in prange(nz):
         for j in range(ny):
-            for i in range(nx):
-                balance_cell(flow, shares, fresh, equation, k, j, i)
+            row = k + LOW, j + LOW, LOW
+            balance_row(flow, shares, row, flow.open_cells[k, j], b[k, j])
+            if fresh:
+                write_coefficients(flow, shares, 0, row, (0, nx), ax[k, j], anchor[k, j])
+                write_coefficients(flow, shares, 1, row, (j, ny), ay[k, j], anchor[k, j])
+                write_coefficients(flow, shares, 2, row, (k, nz), az[k, j], anchor[k, j])
+
+
+@vector_inline
+def balance_row(flow, shares, row, open_cells, b):
+    """b = -(V d eps/dt + outflow of eps u) of the cells of a row [m3/s]; row is the first of them."""
+    (k, j, i), velocity, areas = row, flow.velocity, flow.areas
+    west, east, south, north = (k, j, i - 1), (k, j, i + 1), (k, j - 1, i), (k, j + 1, i)
+    down, up = (k - 1, j, i), (k + 1, j, i)
+    for x in range(b.size):
+        outflow = flow.rate[k, j, i + x] * open_cell(shares, k, j, i + x) * areas[0] / flow.inverse[0]
+        above = through(flow, shares, 0, row, east, x) * velocity[0, k, j, i + 1 + x]
+        outflow += areas[0] * (above - through(flow, shares, 0, west, row, x) * velocity[0, k, j, i + x])
+        above = through(flow, shares, 1, row, north, x) * velocity[1, k, j + 1, i + x]
+        outflow += areas[1] * (above - through(flow, shares, 1, south, row, x) * velocity[1, k, j, i + x])
+        above = through(flow, shares, 2, row, up, x) * velocity[2, k + 1, j, i + x]
+        outflow += areas[2] * (above - through(flow, shares, 2, down, row, x) * velocity[2, k, j, i + x])
+        b[x] = -outflow * open_cells[x]
 
 
 @inline
-def balance_cell(flow, shares, fresh, equation, k, j, i):
-    """b = -(V d eps/dt + outflow of eps u) of a cell [m3/s] and, if fresh, its coefficients and anchor."""
-    velocity, mobility, voidage, areas, inverse = flow.velocity, flow.mobility, flow.voidage, flow.areas, flow.inverse
-    (nz, ny, nx), ends = flow.open_cells.shape, flow.ends
-    ax, ay, az, anchor, b = equation
-    kk, jj, ii = k + LOW, j + LOW, i + LOW
-    outflow, anchored = flow.rate[kk, jj, ii] * open_cell(shares, kk, jj, ii) * areas[0] / inverse[0], 0.0
-    here = voidage[kk, jj, ii]
-    for d in range(3):
-        dk, dj, di = UNIT[d]
-        below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here) * open_face(shares, d, kk, jj, ii)
-        above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
-        above *= open_face(shares, d, kk + dk, jj + dj, ii + di)
-        outflow += areas[d] * (above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii])
-        if fresh:
-            a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
-            a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
-            place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
-            # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
-            if ends[d, 0] and place == 0:
-                anchored += 2.0 * a_below
-                a_below = 0.0
-            if ends[d, 1] and place == cells - 1:
-                anchored += 2.0 * a_above
-            if cells == 1:
-                a_below = 0.0
-            if d == 0:
-                ax[k, j, i] = a_below
-            elif d == 1:
-                ay[k, j, i] = a_below
-            else:
-                az[k, j, i] = a_below
-    b[k, j, i] = -outflow * flow.open_cells[k, j, i]
-    if fresh:
-        anchor[k, j, i] = anchored
+def write_coefficients(flow, shares, d, row, place, out, anchor):
+    """Write the coefficients of the low faces of a row of cells along d, and add to their anchors, x first.
+
+    row    the first of the cells
+    place  of the row among the rows along d, 0 along x, and the number of cells there
+    """
+    (k, j, i), (dk, dj, di), (number, count) = row, UNIT[d], place
+    take_row(flow, shares, d, (k - dk, j - dj, i - di), row, out)
+    if d == 0:
+        anchor[:] = 0.0
+    # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
+    if flow.ends[d, 0] and number == 0:
+        take_low_side(out[:1] if d == 0 else out, anchor)
+    if count == 1:
+        out[:] = 0.0
+    if flow.ends[d, 1] and (d == 0 or number == count - 1):
+        last = count - 1 if d == 0 else 0
+        take_high_side(flow, shares, d, (k, j, i + last), (k + dk, j + dj, i + di + last), anchor[last:])
+
+
+@vector_inline
+def take_row(flow, shares, d, low, high, out):
+    """Write the coefficients of the faces of a row."""
+    for x in range(out.size):
+        out[x] = coefficient(flow, shares, d, low, high, x)
+
+
+@vector_inline
+def take_low_side(coefficients, anchor):
+    """Make coefficients of faces on a low side of the box anchors."""
+    for x in range(coefficients.size):
+        anchor[x] += 2.0 * coefficients[x]
+        coefficients[x] = 0.0
+
+
+@vector_inline
+def take_high_side(flow, shares, d, low, high, anchor):
+    """Add the anchors of faces on a high side of the box."""
+    for x in range(anchor.size):
+        anchor[x] += 2.0 * coefficient(flow, shares, d, low, high, x)
 
 
 @threaded
