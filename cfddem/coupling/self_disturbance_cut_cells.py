@@ -36,7 +36,7 @@ APART = 6
 """Distance in cells at which a cell no longer gathers from another one, at most."""
 
 NEVER = 1000
-"""Numbers of cells after which an axis that is not periodic begins again: more than there are."""
+"""An axis that is not periodic begins again after this many times its cells, which is farther than any place."""
 
 NEIGHBOURS = tuple(product((-1, 0, 1), repeat=3))
 """Steps along z, y, x from a cell to itself and its neighbours."""

@@ -112,8 +112,10 @@ class NearWalls(NoWalls):
     def hold(self, new: Array, density: float, model_b: float, step: float, weight: float) -> None:
         """See `NoWalls.hold`."""
         fields = self.fields
+        # the first stage writes where the second one reads
+        of_stage = fields.velocity if weight == 0.0 else fields.stage_velocity
         old, stage, after, mobility = (
-            field.reshape(3, -1) for field in (fields.velocity, fields.stage_velocity, new, fields.mobility)
+            field.reshape(3, -1) for field in (fields.velocity, of_stage, new, fields.mobility)
         )
         viscosity, voidage = fields.effective_viscosity.reshape(-1), fields.centred_voidage.reshape(-1)
         for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
@@ -184,14 +186,14 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     farther, pull = profiles.next[at], np.zeros((3, at.size))
     pull[:2] = profiles.shear[:, at] * wall_area
     pull[2] = -(pull[:2] * profiles.sliding[[at, farther]]).sum(axis=0)
-    stiff += pull[0]
+    square = inverse.max() ** 2
+    stiff = square * _rounded((stiff + pull[0]) / square)
     is_stiff = stiff > 0.0
     # beyond an outlet the fluid is not continuous: convection and growth there act on equally much fluid, or u grows
     at_outlet = np.isin(at // steps[d] % shape[2 - d], [layer for axis, layer in outlets if axis == d])
     acting = _rounded(np.where(at_outlet, np.maximum(open_share, FULL), open_share))
     fill = _in_blocks(at // steps[2])
     beside: Any = (farther - place).astype(np.uint32)
-    square = inverse.max() ** 2
     weight, constant, pull = square * _rounded(weight / square), _rounded(constant), square * _rounded(pull / square)
     pattern, first = _patterns([weight, constant, pull, acting, further, beside], fill)
 

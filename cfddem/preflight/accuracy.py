@@ -1,6 +1,6 @@
 """What cells, kernel and fluid step cost in accuracy, as far as it was measured in beds of the validation.
 
-LIQUID are rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`). The other numbers are those of
+`LIQUID` has rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`). The other numbers are those of
 pages; no command computes them again, except those of a lattice. Another bed may differ from all of these.
 """
 

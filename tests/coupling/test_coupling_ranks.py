@@ -20,6 +20,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
 from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
+from cfddem.coupling.forces.pressure import PressureForce
 from cfddem.coupling.ghost_deposit import GhostDeposit
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.features.heat import HeatExchange
@@ -346,6 +347,26 @@ def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[boo
     inside = np.clip(places[:, 2], 0.005, 0.135)
     assert alone[0] == pytest.approx(inside, rel=1e-12)
     assert all(np.array_equal(*pair) for found in on_ranks(8, program) for pair in zip(found, alone))
+
+
+def test_a_cut_that_hands_over_no_particle_changes_the_cells_of_a_rank() -> None:
+    """The pressure force uses the cells of earlier steps again, but not those of another division of space."""
+
+    def program(communicator: Communicator) -> None:
+        communicator.shape = (1, 1, 2)
+        simulation = begun(case_of(BEADS), communicator)
+        advanced(simulation, 2)
+        kernel, particles = simulation.coupling.kernel, simulation.owned
+        force = next(each for each in simulation.coupling.forces if isinstance(each, PressureForce))
+        bricks = kernel.owners.division
+        kernel.owners.division = Bricks((*bricks.planes[:2], bricks.planes[2] - kernel.grid.spacing[2]))
+        reach, cell_map = kernel.reach, kernel.map_particles(particles.position, particles.radius)
+        assert kernel.reach is not reach
+        after_cut = force.force(particles, cell_map)
+        force.forget()
+        np.testing.assert_array_equal(after_cut, force.force(particles, cell_map))
+
+    on_ranks(2, program)
 
 
 def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -236,17 +236,12 @@ many_steps_alone = cache(many_steps)
 """In one process."""
 
 
-DIFFER = pytest.mark.xfail(strict=True, reason="on 2 x 2 x 2 ranks beds in cones lose bits")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "shape"),
     [
         *((name, shape) for name in (*MANY, SURFACE) for shape in ((1, 2, 1), (2, 2, 1))),
-        ("weir and feed", (2, 2, 2)),
-        pytest.param("cone with a draft tube", (2, 2, 2), marks=DIFFER),
-        pytest.param(SURFACE, (2, 2, 2), marks=DIFFER),
+        *((name, (2, 2, 2)) for name in ("weir and feed", "cone with a draft tube", SURFACE)),
     ],
 )
 @pytest.mark.usefixtures("surface_file")

@@ -78,7 +78,7 @@ def test_exponent_of_an_exact_power_law() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", [NARROW["column.cell"], 5e-3 / 3.0])
 def test_the_boundary_of_a_suspension_falls_as_its_drag_law_says(cell: float) -> None:
-    """With smeared surfaces it is 2 to 5 % slower: a dense layer lies over a gap there."""
+    """At a solid fraction of 0.2. With smeared surfaces it is 2 to 5 % slower: a dense layer lies over a gap there."""
     case = vessel()
     fluid = case.required_fluid
     law = fluidising_velocity(case.bed.diameter, 2560.0, fluid.density, fluid.viscosity, 0.8, di_felice)

@@ -34,6 +34,7 @@ class PressureForce(FluidForce):
         self.fluid, self.kernel = fluid, kernel
         self._known: list[ParticleCellMap] = []  # of the last step and the one before
         self._known_ids = np.zeros(0, np.int64)  # of the particles in the rows of these maps
+        self._known_reach: object = None  # the cells that these maps number
 
     def respond(self, terms: CouplingTerms) -> None:
         """The force by the new pressure."""
@@ -46,8 +47,9 @@ class PressureForce(FluidForce):
         gathered from the places of these three steps with the same weights.
         """
         gradient = self.fluid.cell_pressure_gradient()
-        if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
-            self._known = []  # rows have changed
+        same = self._known_reach is self.kernel.reach  # else space has been cut anew
+        if not (same and np.array_equal(self._known_ids, particles.id)):  # local: rows of this rank
+            self.forget()
         last, earlier = (
             self._stencil(particles, n, name) for n, name in enumerate(("mapped_position", MAPPED_EARLIER.name))
         )
@@ -56,8 +58,12 @@ class PressureForce(FluidForce):
             along *= -cell_map.volume
         return force
 
+    def forget(self) -> None:
+        """Find the stencils of earlier steps anew."""
+        self._known = []
+
     def _stencil(self, particles: Particles, n: int, name: str) -> Stencil:
-        """Stencil of stored positions; kept from the step before unless rows of particles have changed since."""
+        """Stencil of stored positions; kept from the step before unless rows or cells of the rank have changed."""
         if n < len(self._known):
             return self._known[n].stencil
         return self.kernel.stencil(particles[name], particles.radius)
@@ -67,6 +73,7 @@ class PressureForce(FluidForce):
         particles, cell_map = terms.particles, terms.cell_map
         particles.earlier_mapped_position = particles.mapped_position
         self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()
+        self._known_reach = self.kernel.reach
 
 
 # ---------------------------------------------------------------- viscous stress

@@ -112,8 +112,11 @@ def open_cell(shares, k, j, i):
 
 @inline
 def through(flow, shares, d, low, high, x):
-    """Open share of the face normal to d times its voidage; low and high are the first of two rows of cells, x the
-    place in these."""
+    """Open share of the face normal to d times its voidage.
+
+    low, high  first cells of the two rows on both sides
+    x          place in these rows
+    """
     (k, j, i), (low_k, low_j, low_i) = high, low
     voidage = 0.5 * (flow.voidage[low_k, low_j, low_i + x] + flow.voidage[k, j, i + x])
     return voidage * open_face(shares, d, k, j, i + x)
