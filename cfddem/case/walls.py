@@ -232,6 +232,9 @@ def _refuse_misfits(name: str, kind: type[Wall], keys: dict[str, Any]) -> None:
             "shape", name, f"a name that no other shape has, beside {', '.join(SHAPES)}", "take another one"
         )
     own, others = _keys_of(kind), {key for shape in SHAPES if shape != name for key in _keys_of(SHAPES[shape])}
+    general = OF_EVERY_CASE - {key for shape in SHAPES.values() for key in _keys_of(shape)}
+    for key in sorted({*own} & general):
+        raise InputError(f"shape.{name}.{key}", None, "of another name", "a case has a key of this name for every wall")
     for key in sorted({*own} - {*keys} - OF_EVERY_CASE - others):
         remedy = f'add {key}=Annotated[float, Field(description="... [m]")]'
         raise InputError(f"shape.{name}.{key}", None, "described in register", remedy)

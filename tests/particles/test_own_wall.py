@@ -101,6 +101,9 @@ def test_every_part_of_the_package_knows_the_shape(page: dict[str, Any]) -> None
 def test_what_does_not_fit_is_refused_before_anything_changes(page: dict[str, Any]) -> None:
     """A taken name; a key without description, which no class has, or which other shapes have. One line each."""
     described = Annotated[float, Field(gt=0, description="inner radius [m]")]
+    timed = make_dataclass("Timed", [("end", float)], bases=(page["Ring"],), frozen=True, kw_only=True)
+    with pytest.raises(InputError, match=r"shape\.timed\.end: must be of another name"):
+        register("timed", timed)
     disc = make_dataclass("Disc", [("thickness", float)], bases=(page["Ring"],), frozen=True, kw_only=True)
     for name, keys, message in (
         ("plane", {}, "shape = 'plane': must be a name that no other shape has"),
