@@ -1,7 +1,7 @@
 """How a loop is compiled for a graphics processor (GPU): the third way, beside one thread and several.
 
-Using it needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one particle or one pair are
-the same functions as on the processor; only the loop around them is another one.
+It needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one particle or one pair are the same functions as
+on the processor; only the loop around them is another one.
 
     kernel   a loop that runs on the GPU, started from Python
     device   a function that a kernel calls: every function is, when it is compiled for a kernel
@@ -34,7 +34,7 @@ BLOCK = 128
 """Threads of a block."""
 
 SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
-"""Whether kernels run in the simulator of numba-cuda, which needs no GPU: for tests."""
+"""Whether kernels run in the simulator of the compiler, which needs no GPU: for tests."""
 
 
 class _Kernel:
@@ -73,10 +73,10 @@ def name_of_gpu() -> str:
     try:
         return str(cuda.get_current_device().name)
     except Exception as failure:  # the driver, its library or the device is missing
-        raise of_gpu(failure) from None
+        raise gpu_error(failure) from None
 
 
-def of_gpu(failure: Exception) -> InputError:
+def gpu_error(failure: Exception) -> InputError:
     """A failure of driver, compiler or memory of the GPU as one line."""
     words = " ".join(str(failure).split()) or type(failure).__name__
     fault = words if len(words) <= 100 else f"{words[:100]} ..."
@@ -95,11 +95,9 @@ class DeviceArrays:
 
         changed  copy its values, also where there was one of this name and shape
         """
-        there = self._arrays.get(name)
-        if there is None or there.shape != array.shape:
-            self._arrays.pop(name, None)
-            self._arrays[name] = there = cuda.to_device(array)
-        elif changed and array.size:
+        before = self._arrays.get(name)
+        there = self.room(name, array)
+        if array.size and (changed or there is not before):
             there.copy_to_device(array)
         return there
 
@@ -133,7 +131,7 @@ def launch(loop: Any, rows: int, *arguments: Any) -> None:
 def _rounded_as_on_the_processor() -> Iterator[None]:
     """Compile without instructions that round a product and a sum at once, for which the compiler has no option.
 
-    The program that links would make them again, so it gets machine code.
+    To optimise once more while linking would make them again, and is switched off.
     """
     from numba.cuda.cudadrv import nvvm
 

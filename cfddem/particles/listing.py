@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
+from cfddem.backend.compile import MANY_ROWS
 from cfddem.backend.errors import InputError
 from cfddem.model.fields import Field
 from cfddem.particles.bricks import Bricks
@@ -19,7 +20,7 @@ from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.walls.nearest_point import Walls
 
-THREADING_PAYS = 1000
+THREADING_PAYS = MANY_ROWS
 """Number of particles from which loops run on all threads."""
 
 LISTING_COST = 8.0

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
-from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, kernel, launch, name_of_gpu, of_gpu
+from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, gpu_error, kernel, launch, name_of_gpu
 from cfddem.backend.named import named_arrays
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
 from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches
@@ -144,14 +144,14 @@ class StepsOnGpu:
             raise RunFailed("an advance on the GPU was interrupted, and its results were not received; begin anew")
         self._interrupted, steps = True, min(steps, STEPS)
         try:
-            self._made(system, step, steps, origin, reach)
+            self._advance(system, step, steps, origin, reach)
         except Exception as failure:  # of the driver, of the compiler, or no memory is left
-            raise of_gpu(failure) from failure
+            raise gpu_error(failure) from failure
         self._interrupted = False
         far = 1 in self._moved_far[: max(steps, 1)]
         return min(int(self._done[0]), steps), math.inf if far else 0.0, 0
 
-    def _made(self, system: System, step: float, steps: int, origin: np.ndarray, reach: float) -> None:
+    def _advance(self, system: System, step: float, steps: int, origin: np.ndarray, reach: float) -> None:
         """Make steps: send, launch and receive."""
         sent, receive = self._arrays.sent, self._arrays.receive
         on_gpu = self._sent(system)

@@ -223,7 +223,7 @@ def check_gpu(case: Case) -> Iterator[Issue]:
     keys = [key for key, is_there in others.items() if is_there]
     if case.run.gpu and keys:
         yield Issue(
-            "error", "run.gpu", f"steps on a graphics processor do not know {', '.join(keys)}",
+            "error", "run.gpu", f"steps on a graphics processor do not support {', '.join(keys)}",
             "leave them out, or set run.gpu = false",
         )  # fmt: skip
 

@@ -15,7 +15,6 @@ import numpy as np
 from cfddem.analysis.comparison import changed
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
-from cfddem.backend.gpu import name_of_gpu
 from cfddem.backend.law_set import check_compiles, fingerprint
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
@@ -184,6 +183,8 @@ def require_compiled(case: Case) -> None:
     errors  InputError
     """
     if case.run.gpu:
+        from cfddem.backend.gpu import name_of_gpu  # loads a compiler that other runs do not need
+
         name_of_gpu()
     for kind, law in case.laws.own_laws.items():
         check_compiles(f"laws.{kind}", law.function)

@@ -24,6 +24,7 @@ import numpy as np
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
+from cfddem.backend.gpu import name_of_gpu
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -153,7 +154,7 @@ def bench(
     return {
         "particles": count,
         "threads": threads,
-        "gpu": _gpu() if gpu else "",
+        "gpu": name_of_gpu() if gpu else "",
         "film": film or full,
         "films that resist sliding": full,
         "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
@@ -197,12 +198,6 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "", f"{moved:.0f} bytes a particle-step: {share:.2f} of the triad, {result['triad [GB/s]']:.1f} GB/s"
     if result["lammps"] and not water and not result["gpu"]:
         yield "LAMMPS", result["lammps"]
-
-
-def _gpu() -> str:
-    from cfddem.backend.gpu import name_of_gpu
-
-    return name_of_gpu()
 
 
 def _peak_memory() -> float:

@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 from cfddem.backend.compile import prange, threaded, use_threads
+from cfddem.backend.gpu import BLOCK, cuda, name_of_gpu
 from cfddem.particles.solver import ParticleSolver
 
 GRAPH_BYTES = 4 + 4 + 1
@@ -46,10 +47,6 @@ def _triad(a, b, c, s):
 
 def triad_of_gpu(count: int = 50_000_000, repeats: int = 5) -> float:
     """The same of the graphics processor [bytes/s]."""
-    from numba import cuda
-
-    from cfddem.backend.gpu import BLOCK, name_of_gpu
-
     name_of_gpu()  # refuses where there is none
 
     @cuda.jit

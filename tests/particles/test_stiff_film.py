@@ -95,8 +95,9 @@ class TypicalCollision:
         """Restitution of the engine with one step size throughout."""
         pair = self.pair
         pair.gap = pair.reduced_radius
-        laws, shared = Laws(film=True, integrator=integrator), integrator == "verlet"  # as other tests compile it
-        run = pair.simulation(laws, skin=4.0 * max(pair.radii), record=shared)
+        record = integrator == "verlet"  # as other tests have it, whose loops these are
+        laws = Laws(film=True, integrator=integrator)
+        run = pair.simulation(laws, skin=4.0 * max(pair.radii), record=record)
         step = fraction * pair.hertz_time
         crossing = max(1, math.ceil(pair.gap / (pair.approach * step) / 20))
         for _ in range(5000):
