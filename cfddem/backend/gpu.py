@@ -4,7 +4,11 @@ It needs numba-cuda, `pip install 'cfddem[gpu]'`. What a loop does to one partic
 on the processor; only the loop around them is another one.
 
     kernel   a loop that runs on the GPU, started from Python
+    helper   a function that only kernels call
     device   a function that a kernel calls: every function is, when it is compiled for a kernel
+
+The threads of a launch come in blocks (`Threads`). Numbers of all of them are reduced to one (`greatest_of_all`,
+`sum_of_all`) within each block, and then by each block over all blocks; all threads wait for one another in between.
 
 A product and the sum that it enters are rounded one after the other, as on the processor. So both give the same bits
 where they call no functions but square roots.
@@ -18,7 +22,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
+from threading import current_thread
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,16 +42,21 @@ SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 """Whether kernels run in the simulator of the compiler, which needs no GPU: for tests."""
 
 
-class _Kernel:
-    """A loop for the GPU before its slots are filled."""
+class _Template:
+    """A loop or a function for the GPU before its slots are filled."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.py_func, self.__name__, self.compiled_as = function, function.__name__, _compiled
+    def __init__(self, function: Callable[..., Any], way: Callable[..., Any]) -> None:
+        self.py_func, self.__name__, self.compiled_as = function, function.__name__, way
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """A loop for the GPU as a template; `for_gpu` compiles it."""
-    return _Kernel(function)
+    return _Template(function, _compiled)
+
+
+def helper(function: Callable[..., Any]) -> Any:
+    """A function that only loops for the GPU call, as a template."""
+    return _Template(function, helper)
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
@@ -123,7 +133,7 @@ def launch(loop: Any, rows: int, *arguments: Any) -> None:
     with _rounded_as_on_the_processor(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*Grid size")  # few rows need few threads
         compiled = loop.compile(tuple(loop.typeof_pyval(argument) for argument in arguments))
-        blocks = min(compiled.max_cooperative_grid_blocks(BLOCK), max(1, -(-rows // BLOCK)))
+        blocks = min(compiled.max_cooperative_grid_blocks(BLOCK), max(1, -(-rows // BLOCK)), MOST_BLOCKS)
         loop[blocks, BLOCK](*arguments)
 
 
@@ -141,3 +151,97 @@ def _rounded_as_on_the_processor() -> Iterator[None]:
         yield
     finally:
         nvvm.compile_ir = original
+
+
+# ---------------------------------------------------------------- within a kernel
+
+
+MOST_BLOCKS = 4096
+"""Of a launch that reduces numbers of all threads to one."""
+
+
+def _simulated_wait() -> None:
+    current_thread().syncthreads()  # type: ignore[attr-defined]
+
+
+syncthreads: Any = _simulated_wait if SIMULATED or cuda is None else cuda.syncthreads
+"""Wait for the other threads of the block."""
+
+
+class Threads(NamedTuple):
+    """The threads of a launch, as one of them sees them."""
+
+    grid: Any  # all of them, which can wait for one another
+    mine: int  # number of this one
+    number: int  # of all of them
+    lane: int  # number of this one in its block
+    width: int  # of a block, a power of two
+    block: int  # number of this block
+    blocks: int
+    tops: Any  # memory of the block, a number for each of its threads
+    wholes: Any  # the same for integers
+    tops_of_blocks: Any  # (number of reductions times `MOST_BLOCKS`), for all blocks
+    wholes_of_blocks: Any  # the same for integers
+
+
+@helper
+def greatest_of_all(value, place, threads):
+    """The largest of a number of each thread, not below 0; NaN if one of them is NaN.
+
+    place  row of the memory of all blocks; between two calls with the same one all threads wait for one another
+    """
+    top = _greatest_of_block(value, threads)
+    begin = place * MOST_BLOCKS
+    if threads.lane == 0:
+        threads.tops_of_blocks[begin + threads.block] = top
+    threads.grid.sync()
+    top = 0.0
+    for block in range(threads.lane, threads.blocks, threads.width):
+        other = threads.tops_of_blocks[begin + block]
+        top = other if other > top or other != other else top
+    return _greatest_of_block(top, threads)
+
+
+@helper
+def _greatest_of_block(value, threads):
+    tops, lane, half = threads.tops, threads.lane, threads.width // 2
+    tops[lane] = value
+    syncthreads()
+    while half > 0:
+        if lane < half:
+            other = tops[lane + half]
+            tops[lane] = other if other > tops[lane] or other != other else tops[lane]
+        syncthreads()
+        half //= 2
+    top = tops[0]
+    syncthreads()
+    return top
+
+
+@helper
+def sum_of_all(whole, place, threads):
+    """The sum of an integer of each thread; see `greatest_of_all`."""
+    total = _sum_of_block(whole, threads)
+    begin = place * MOST_BLOCKS
+    if threads.lane == 0:
+        threads.wholes_of_blocks[begin + threads.block] = total
+    threads.grid.sync()
+    total = 0
+    for block in range(threads.lane, threads.blocks, threads.width):
+        total += threads.wholes_of_blocks[begin + block]
+    return _sum_of_block(total, threads)
+
+
+@helper
+def _sum_of_block(whole, threads):
+    wholes, lane, half = threads.wholes, threads.lane, threads.width // 2
+    wholes[lane] = whole
+    syncthreads()
+    while half > 0:
+        if lane < half:
+            wholes[lane] += wholes[lane + half]
+        syncthreads()
+        half //= 2
+    total = wholes[0]
+    syncthreads()
+    return total

@@ -119,7 +119,7 @@ class CaseRun(Checked):
     record_collisions: bool = Field(
         False, description="record every collision of two particles, from first to last contact"
     )
-    gpu: bool = Field(False, description="make the steps of the particles on a graphics processor; dry contacts alone")
+    gpu: bool = Field(False, description="make the steps of the particles on a graphics processor; no bridges")
 
 
 class CaseTables(Checked):

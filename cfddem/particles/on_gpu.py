@@ -1,9 +1,9 @@
 """The steps of :mod:`cfddem.particles.integrate` on a graphics processor.
 
-One thread a particle, one thread a pair: what a thread does to its particle or pair are the functions that the loops
-of the processor call. A thread of a particle sums the forces of its pairs in their order, so that results are the same
-bits in every run. All steps until the next neighbour list are one launch, in which all threads wait for one another
-between pairs and particles. Neighbour lists are made by the processor.
+One thread a particle, one thread a pair: what a thread does to its particle, pair or film are the functions that the
+loops of the processor call. A thread of a particle sums the forces of its pairs in their order, so that results are the
+same bits in every run. All steps until the next neighbour list are one launch, in which all threads wait for one
+another between pairs and particles. Neighbour lists are made by the processor.
 
 Arrays travel at each call: particles both ways, what pairs remember, and the graph where it is new.
 """
@@ -17,10 +17,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
-from cfddem.backend.gpu import DeviceArrays, cuda, for_gpu, gpu_error, kernel, launch, name_of_gpu
+from cfddem.backend.gpu import (
+    BLOCK,
+    MOST_BLOCKS,
+    DeviceArrays,
+    Threads,
+    cuda,
+    for_gpu,
+    gpu_error,
+    kernel,
+    launch,
+    name_of_gpu,
+)
 from cfddem.backend.named import named_arrays
+from cfddem.particles.films_on_gpu import PLACES, solve_films
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
-from cfddem.particles.interactions.pair_loops import WRITTEN, pair_force, pair_touches
+from cfddem.particles.interactions import joint_films
+from cfddem.particles.interactions.film import update_edge_film
+from cfddem.particles.interactions.joint_films import list_all_due, mark_due
+from cfddem.particles.interactions.pair_loops import WRITTEN, pair_film, pair_force, pair_touches
+from cfddem.particles.interactions.slots import FILM, JOINT
 from cfddem.particles.pair_graph import Graph
 from cfddem.particles.system import System
 from cfddem.particles.walls.mesh_contacts import pairs_at_walls
@@ -29,8 +45,8 @@ from cfddem.particles.walls.nearest_point import advance_walls, touch_edge
 STEPS = 4096
 """The most steps of one launch."""
 
-READ = ("position", "velocity", "spin", "radius", "inverse_mass", "inverse_inertia", "material", "applied", "force",
-        "torque")  # fmt: skip
+READ = ("position", "velocity", "spin", "radius", "inverse_mass", "inverse_inertia", "material", "viscosity", "applied",
+        "force", "torque")  # fmt: skip
 """Fields of the particles that the steps read."""
 
 FOUND = ("position", "velocity", "spin", "force", "torque")
@@ -47,10 +63,18 @@ MOVED = ("shift", "turned", "travel")
 GRAPH = ("first", "second", "image", "touch", "start", "incident")
 """Arrays of the graph."""
 
+SOLVED = {field.name for field in (*joint_films.JOINT_FIELDS, *joint_films.SLIDING_FIELDS)}
+"""Fields of the pairs that a step with films writes before it reads them, and that nobody reads after it."""
+
+SUMS = tuple(field.name for field in (*joint_films.WEAK_PARTICLE_FIELDS, *joint_films.PARTICLE_FIELDS))
+"""The same of the particles."""
+
 
 class _Parameters(NamedTuple):
     gravity: tuple[float, float, float]
     free: Any
+    cutoff_ratio: float
+    film_tolerance: float
     rolling_damping: float
     contact: Any
 
@@ -67,45 +91,76 @@ class _System(NamedTuple):
     table: Any
     kinds: int
     parameters: _Parameters
+    film_counts: Any
+
+
+class _Shared(NamedTuple):
+    """What all threads of a launch write."""
+
+    tops: Any  # memory in which all blocks reduce numbers
+    wholes: Any  # the same for integers
+    moved_far: Any  # 1 at a step in which a particle or wall has moved by the reach
+    done: Any  # number of steps made
 
 
 @kernel
-def _steps(system, at_walls, step, steps, origin, reach, moved_far, done):
+def _steps(system, at_walls, step, steps, origin, reach, shared):
     """Find the forces at the present positions (`steps` = 0), or make steps until a particle has moved by `reach`."""
     grid = cuda.cg.this_grid()
-    mine, threads = cuda.grid(1), cuda.gridsize(1)
+    mine, number = cuda.grid(1), cuda.gridsize(1)
+    threads = Threads(
+        grid, mine, number, cuda.threadIdx.x, cuda.blockDim.x, cuda.blockIdx.x, cuda.gridDim.x,
+        cuda.shared.array(BLOCK, np.float64), cuda.shared.array(BLOCK, np.int64),
+        shared.tops, shared.wholes,
+    )  # fmt: skip
     particles, edges = system.particles, system.edges
-    count, pairs = len(particles.radius), may_touch(edges)
+    count, pairs, spheres = len(particles.radius), may_touch(edges), edges.between_particles
     half = step if steps > 0 else 0.0
-    for n in range(max(steps, 1)):
-        if steps > 0:
-            for i in range(mine, count, threads):
-                kick(i, particles, step, False)
-                if not drift(i, particles, system.parameters.free, step, origin) < reach * reach:
-                    moved_far[n] = 1
-            if mine == 0 and not advance_walls(system.walls, step) < reach:
-                moved_far[n] = 1
+    if JOINT and steps > 0:
+        for k in range(mine, len(edges.first), number):
+            mark_due(k, system, step)
         grid.sync()
-        for k in range(mine, pairs, threads):
-            pair_touches(k, system)
-            if system.memory.touching[k] != 0:
-                pair_force(k, system, half)
-        for k in range(edges.between_particles + mine, len(edges.first), threads):
+        for i in range(mine, count, number):
+            list_all_due(i, system)
+    for n in range(max(steps, 1)):
+        if JOINT and steps > 0:
+            for i in range(mine, count, number):
+                kick(i, particles, step, False)
+            grid.sync()
+            solve_films(system, step, threads)
+        if steps > 0:
+            for i in range(mine, count, number):
+                if not JOINT:
+                    kick(i, particles, step, False)
+                if not drift(i, particles, system.parameters.free, step, origin) < reach * reach:
+                    shared.moved_far[n] = 1
+            if mine == 0 and not advance_walls(system.walls, step) < reach:
+                shared.moved_far[n] = 1
+        grid.sync()
+        for k in range(mine, spheres if FILM else pairs, number):
+            if FILM:
+                pair_film(k, system, half)
+            if k < pairs:
+                pair_touches(k, system)
+                if system.memory.touching[k] != 0:
+                    pair_force(k, system, half)
+        for k in range(spheres + mine, len(edges.first), number):
             touch_edge(k, at_walls)
+            if FILM:
+                update_edge_film(k, system, half)
             wall_contact(np.uint64(k), system, half)
         grid.sync()
-        for i in range(mine, count, threads):
+        for i in range(mine, count, number):
             gather_forces(i, system, pairs)
             if steps > 0:
                 kick(i, particles, step, True)
         if mine == 0:
-            done[0] = n + 1
-        if moved_far[n] != 0:
+            shared.done[0] = n + 1
+        if shared.moved_far[n] != 0:
             break
 
 
 LEFT_OUT = {
-    "FILM": "films",
     "BRIDGE": "liquid bridges",
     "TRIANGLES": "walls of triangles",
     "RECORD": "a record of collisions",
@@ -126,13 +181,15 @@ class StepsOnGpu:
 
     def __init__(self, choices: Mapping[str, Any], energies: bool, ranks: int) -> None:
         refused = [words for slot, words in LEFT_OUT.items() if choices[slot]]
+        refused += ["films as explicit forces"] * (choices["FILM"] and not choices["DRIFTING"])
         refused += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
         if refused:
             remedy = "leave them out, or take gpu = false"
-            raise InputError("gpu", " and ".join(refused), "a run of dry contacts", remedy)
+            raise InputError("gpu", " and ".join(refused), "a run of contacts and films", remedy)
         name_of_gpu()  # refuses where there is none
         self._steps, self._arrays = for_gpu(_steps, choices), DeviceArrays()
         self._moved_far, self._done = np.zeros(STEPS, np.uint8), np.zeros(1, np.int64)
+        self._tops, self._wholes = np.zeros(PLACES * MOST_BLOCKS), np.zeros(PLACES * MOST_BLOCKS, np.int64)
         self._listed: Any = None
         self._interrupted = False
 
@@ -158,14 +215,19 @@ class StepsOnGpu:
         at_walls = pairs_at_walls.py_func(on_gpu)
         at_walls = at_walls._replace(free=sent("free", at_walls.free))
         self._moved_far[:] = 0
-        launch(
-            self._steps, max(system.particles.owned, len(system.edges.first)), on_gpu, at_walls, step, steps,
-            sent("origin", origin), reach, sent("moved_far", self._moved_far), sent("done", self._done),
+        room = self._arrays.room
+        shared = _Shared(
+            room("tops", self._tops), room("wholes", self._wholes),
+            sent("moved_far", self._moved_far), sent("done", self._done),
         )  # fmt: skip
-        written = {"particles": FOUND, "edges": ("touch",), "memory": system.memory._fields, "walls": MOVED}
+        rows = max(system.particles.owned, len(system.edges.first))
+        launch(self._steps, rows, on_gpu, at_walls, step, steps, sent("origin", origin), reach, shared)
+        kept = tuple(name for name in system.memory._fields if name not in SOLVED)
+        written = {"particles": FOUND, "edges": ("touch",), "memory": kept, "walls": MOVED}
         for part, names in written.items():
             for name in names:
                 receive(f"{part}.{name}", getattr(getattr(system, part), name))
+        receive("film_counts", system.film_counts)
         receive("moved_far", self._moved_far)
         receive("done", self._done)
 
@@ -173,17 +235,24 @@ class StepsOnGpu:
         """The system on the GPU."""
         new = system.edges.first is not self._listed
         self._listed = system.edges.first
-        sent, parameters, table = self._arrays.sent, system.parameters, np.asarray(system.table)
+        sent, room = self._arrays.sent, self._arrays.room
+        parameters, table = system.parameters, np.asarray(system.table)
 
         def part(of: str, names: tuple[str, ...], changed: bool = True) -> list[Any]:
             return [sent(f"{of}.{name}", getattr(getattr(system, of), name), changed) for name in names]
 
+        sums = tuple(name for name in SUMS if name in system.particles._fields)
+        scratch = [room(f"particles.{name}", getattr(system.particles, name)) for name in sums]
         return _System(
-            particles=named_arrays("Particles", READ)(*part("particles", READ)),
+            particles=named_arrays("Particles", (*READ, *sums, "owned"))(
+                *part("particles", READ), *scratch, system.particles.owned
+            ),
             edges=system.edges._replace(**dict(zip(GRAPH, part("edges", GRAPH, new)))),
             memory=type(system.memory)(
                 *(
-                    (self._arrays.room if name in WRITTEN else sent)(f"memory.{name}", array)
+                    room(f"memory.{name}", array)
+                    if name in SOLVED
+                    else sent(f"memory.{name}", array, new or name not in WRITTEN)
                     for name, array in system.memory._asdict().items()
                 )
             ),
@@ -192,5 +261,6 @@ class StepsOnGpu:
             rows=sent("rows", table.reshape(-1)),
             table=sent("table", table),
             kinds=len(table),
-            parameters=_Parameters(parameters.gravity, parameters.free, parameters.rolling_damping, parameters.contact),
+            parameters=_Parameters(*(getattr(parameters, name) for name in _Parameters._fields)),
+            film_counts=sent("film_counts", system.film_counts),
         )

@@ -62,7 +62,7 @@ class SolverSettings:
     energies     count energy by channel, in `energies`; slows the run down
     check_steps  refuse time steps above the stability limit
     after        an earlier run over the same particles and walls, whose pair memory is taken over
-    gpu          make the steps on a graphics processor; contacts without films and bridges alone
+    gpu          make the steps on a graphics processor; contacts and films, not bridges
     """
 
     free: tuple[float, float, float] = (1.0, 1.0, 1.0)

@@ -211,10 +211,9 @@ def check_surface_laws(case: Case) -> Iterator[Issue]:
 
 
 def check_gpu(case: Case) -> Iterator[Issue]:
-    """Check that a case whose particles step on a graphics processor has dry contacts with exact walls alone."""
+    """Check that a case whose particles step on a graphics processor has nothing that these steps lack."""
     surfaces = [f"wall.{number}" for number, wall in enumerate(case.wall) if not wall.form.exact]
     others = {
-        "laws.lubrication": case.has_films,
         "liquid": bool(case.liquid),
         "run.energy_budget": case.run.energy_budget,
         "run.record_collisions": case.run.record_collisions,

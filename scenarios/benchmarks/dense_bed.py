@@ -125,11 +125,11 @@ def bench(
     films: dict[str, Any] = {"motions": "full" if full else "normal"}
     runs = {"cfddem": bed(count, film or full, bridges, gpu=gpu, **films)}
     if gpu:
-        runs["the processor"] = bed(count)
+        runs["the processor"] = bed(count, film or full, bridges, **films)
     if film or full:
-        runs["without films"] = bed(count, bridges=bridges)
+        runs["without films"] = bed(count, bridges=bridges, gpu=gpu)
     if full:
-        runs["normal films"] = bed(count, True, bridges)
+        runs["normal films"] = bed(count, True, bridges, gpu=gpu)
     if bridges:
         runs["without bridges"] = bed(count, film or full, **films)
     dry = not (film or full or bridges or gpu)

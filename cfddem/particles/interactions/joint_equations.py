@@ -230,27 +230,40 @@ def rates_of(e, velocity, spin, with_walls, system):
     return dot(difference, normal), slip, roll
 
 
+@inline
+def impulses_on(i, impulse, shear_impulse, system):
+    """Sum of the impulses of the films of particle i that are solved together, and of their angular impulses.
+
+    impulse        of each row along the line of centres
+    shear_impulse  against slip, and against roll and twist; not read where films do not slide
+    """
+    edges, memory = system.edges, system.memory
+    total, couple = NOTHING, NOTHING
+    for place in range(edges.start[i], system.particles.joint_end[i]):
+        k, sign = edge_role(memory.joint_incident[place])
+        e = memory.joint_row[k]
+        normal = at(memory.joint_normal, e)
+        total = plus(total, times(sign * impulse[e], normal))
+        if SLIDES:
+            push, roll = slip_and_roll_of(shear_impulse, e)
+            first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
+            total = plus(total, times(sign, push))
+            couple = plus(couple, select(sign > 0.0, first, second))
+    return total, couple
+
+
 @part
 def spread(system, direction):
     """What the impulses of the films solved together do to every particle; or what their `direction` does."""
-    particles, edges, memory = system.particles, system.edges, system.memory
+    particles, memory = system.particles, system.memory
     impulse = memory.joint_direction if direction else memory.joint_impulse
     change = particles.film_along if direction else particles.film_change
+    shear_impulse, turn = impulse, change
     if SLIDES:
         shear_impulse = memory.joint_shear_direction if direction else memory.joint_shear_impulse
         turn = particles.film_turn_along if direction else particles.film_turn
     for i in prange(particles.owned):
-        total, couple = NOTHING, NOTHING
-        for place in range(edges.start[i], particles.joint_end[i]):
-            k, sign = edge_role(memory.joint_incident[place])
-            e = memory.joint_row[k]
-            normal = at(memory.joint_normal, e)
-            total = plus(total, times(sign * impulse[e], normal))
-            if SLIDES:
-                push, roll = slip_and_roll_of(shear_impulse, e)
-                first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
-                total = plus(total, times(sign, push))
-                couple = plus(couple, select(sign > 0.0, first, second))
+        total, couple = impulses_on(i, impulse, shear_impulse, system)
         put(change, i, times(particles.inverse_mass[i], total))
         if SLIDES:
             put(turn, i, times(particles.inverse_inertia[i], couple))

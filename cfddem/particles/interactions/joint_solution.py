@@ -79,6 +79,12 @@ def scale_of(largest, number):
 
 
 @inline
+def whole_units(term):
+    """A term of a sum, in units, as an integer."""
+    return np.int64(round(term))
+
+
+@inline
 def best_factor(by_wanted, by_residual):
     """Factor at which the impulses of the last step take the most energy; 0 where rounding hides it.
 
@@ -101,7 +107,7 @@ def sum_of_terms(system, count, column, power):
     for chunk in prange(CHUNKS):
         whole = 0
         for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            whole += np.int64(np.rint(scale * terms[begin + e]))
+            whole += whole_units(scale * terms[begin + e])
         sums[chunk] = whole
     for chunk in range(CHUNKS):
         total += sums[chunk]
@@ -323,6 +329,16 @@ def film_follows(e, system, length, step):
     return term, outdated
 
 
+@inline
+def particle_follows(i, particles, length):
+    """What the new impulses do to particle i."""
+    change, along = at(particles.film_change, i), at(particles.film_along, i)
+    put(particles.film_change, i, plus(change, times(length, along)))
+    if SLIDES:
+        turn, along = at(particles.film_turn, i), at(particles.film_turn_along, i)
+        put(particles.film_turn, i, plus(turn, times(length, along)))
+
+
 @part
 def follow_direction(system, count, length, step):
     """New impulses at a length along the direction, and what they do to the particles; terms of two sums.
@@ -338,11 +354,7 @@ def follow_direction(system, count, length, step):
             left, outdated = greater(left, sums[0]), greater(outdated, sums[1])
         tops[0, chunk], tops[1, chunk] = left, outdated
     for i in prange(len(particles.radius)):
-        change, along = at(particles.film_change, i), at(particles.film_along, i)
-        put(particles.film_change, i, plus(change, times(length, along)))
-        if SLIDES:
-            turn, along = at(particles.film_turn, i), at(particles.film_turn_along, i)
-            put(particles.film_turn, i, plus(turn, times(length, along)))
+        particle_follows(i, particles, length)
     return greatest(tops[0]), greatest(tops[1])
 
 
@@ -356,6 +368,14 @@ def scale_film(e, system, factor):
         put_slip_and_roll(memory.joint_shear_impulse, e, times(factor, push), times(factor, couple))
 
 
+@inline
+def scale_particle(i, particles, factor):
+    """Multiply what the impulses do to particle i."""
+    put(particles.film_change, i, times(factor, at(particles.film_change, i)))
+    if SLIDES:
+        put(particles.film_turn, i, times(factor, at(particles.film_turn, i)))
+
+
 @part
 def scale_impulses(system, count, factor):
     """Multiply all impulses, and what they do to the particles."""
@@ -363,9 +383,7 @@ def scale_impulses(system, count, factor):
     for e in prange(count):
         scale_film(e, system, factor)
     for i in prange(len(particles.radius)):
-        put(particles.film_change, i, times(factor, at(particles.film_change, i)))
-        if SLIDES:
-            put(particles.film_turn, i, times(factor, at(particles.film_turn, i)))
+        scale_particle(i, particles, factor)
 
 
 @inline
@@ -386,6 +404,14 @@ def keep_film(e, system):
         put_impulses(k, memory.shear_impulse, push, first, second)
 
 
+@inline
+def take_impulses(i, particles):
+    """Give particle i the impulses found."""
+    put(particles.velocity, i, plus(at(particles.velocity, i), at(particles.film_change, i)))
+    if SLIDES:
+        put(particles.spin, i, plus(at(particles.spin, i), at(particles.film_turn, i)))
+
+
 @part
 def give_joint(system, count):
     """Give the particles the impulses found, and keep these."""
@@ -393,6 +419,4 @@ def give_joint(system, count):
     for e in prange(count):
         keep_film(e, system)
     for i in prange(particles.owned):
-        put(particles.velocity, i, plus(at(particles.velocity, i), at(particles.film_change, i)))
-        if SLIDES:
-            put(particles.spin, i, plus(at(particles.spin, i), at(particles.film_turn, i)))
+        take_impulses(i, particles)
