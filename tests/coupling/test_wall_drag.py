@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from cfddem.backend.errors import InputError
-from cfddem.coupling.forces.wall_drag import CLOSEST, WallDrag
+from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
 from cfddem.coupling.self_disturbance_tables import MODES, tables_of
@@ -20,10 +20,11 @@ from cfddem.fluid.surfaces import Plane as SmoothPlane
 from cfddem.fluid.surfaces import cylinder, turned
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
+from cfddem.preflight.summary import preflight
 from cfddem.run.simulation import Simulation
 from closures.lubrication import film_resistance, film_strength
 from closures.tangential_lubrication import film_logarithm, shear_resistance
-from closures.wall_drag import along_wall, film_along_wall, towards_wall
+from closures.wall_drag import CLOSEST, along_wall, film_along_wall, towards_wall
 from scenarios.beds.settling import study as settling
 from scenarios.beds.settling.study import RADIUS as RADIUS_OF_NYLON
 from scenarios.beds.settling.study import Walls, land, land_on_grid, landing_ode
@@ -363,6 +364,28 @@ def test_a_coupled_sphere_lands_as_the_equation_of_motion_says(oil: tuple[float,
     gaps, speeds = land_on_grid(density, viscosity, cell)
     exact = landing_ode(density, viscosity, "nearest", gaps, floor_alone=True)
     assert np.abs(speeds - exact).max() < 0.01 * terminal
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("modulus", "gap"), [(2e5, 1.42), (1e6, 0.67)])
+def test_without_films_a_sphere_oscillates_beside_a_wall_below_the_gap_of_the_check(modulus: float, gap: float) -> None:
+    """Steps of 8.1 and 4.3 ms along the floor, at 0.8 and 1.25 of that gap: motion to and fro grows, or decays."""
+    for share, grows in ((0.8, True), (1.25, False)):
+        case = settling.ten_cate(*OIL).with_(**{
+            "material.nylon.youngs_modulus": modulus, "column.width": 8.0 * EDGE, "column.height": 8.0 * EDGE,
+            "bed.positions": [(4.3 * EDGE, 4.1 * EDGE, (1.0 + share * gap) * RADIUS_OF_NYLON)],
+            "bed.initial_velocity": (0.0, 0.0, -1e-4), "laws.wall_drag": "nearest", "laws.gravity": (9.81, 0.0, 0.0),
+            "run.fluid_step": 0.05, "run.until": 200.0,
+        })  # fmt: skip
+        (issue,) = (each for each in preflight(case).issues if each.key == "laws.wall_drag")
+        assert f"below {gap:.2g} radii" in issue.reason
+        simulation, speeds = Simulation(case), []
+        for _ in range(40):
+            simulation.step()
+            speeds.append(float(simulation.particles.velocity[0, 2]))
+        to_and_fro = np.abs(np.diff(speeds, 2))
+        print(f"gap {share * gap:.2f}: {to_and_fro[5]:.2g} to {to_and_fro[-1]:.2g} m/s")
+        assert (to_and_fro[-1] > to_and_fro[5]) == grows
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.cli.explain_pages import key_lines, matching
 from cfddem.preflight.summary import preflight
+from scenarios.beds.settling.study import ten_cate
 
 GALLERY = gallery()
 
@@ -84,7 +85,7 @@ def test_a_material_that_many_species_name_is_missed_once() -> None:
 def test_the_sum_of_the_drag_beside_all_walls_is_warned_of() -> None:
     """Measured spheres fall at 0.735 to 0.893 of their largest speed with the sum, at 0.990 to 1.023 with "nearest"."""
     settling = GALLERY["settling"]
-    walls = {"column.sides": "no_slip", "laws.wall_drag": "all"}
+    walls = {"column.sides": "no_slip", "laws.wall_drag": "all", "laws.lubrication": "nijssen"}
     (issue,) = (each for each in preflight(settling.with_(**walls)).issues if each.key == "laws.wall_drag")
     assert issue.severity == "warning" and issue.in_report and "ten Cate" in issue.reason
     assert "0.73 to 0.89" in issue.reason and '"nearest"' in issue.remedy
@@ -93,9 +94,24 @@ def test_the_sum_of_the_drag_beside_all_walls_is_warned_of() -> None:
     assert "0.73 to 0.89" in " ".join(" ".join(key_lines(matching("laws.wall_drag"))).split())
 
 
+@pytest.mark.parametrize(("modulus", "step", "gap"), [(2e5, "0.0081", "1.4"), (1e6, "0.0043", "0.67")])
+def test_steps_in_which_a_sphere_oscillates_beside_a_wall_are_warned_of(modulus: float, step: str, gap: str) -> None:
+    """15 mm in oil of 3.73 Pa s; not with films, nor where the step is a fraction of the time in which drag acts."""
+    case = ten_cate(970.0, 3.73).with_(**{
+        "material.nylon.youngs_modulus": modulus, "column.sides": "no_slip", "laws.wall_drag": "nearest",
+        "run.fluid_step": 0.05,
+    })  # fmt: skip
+    (issue,) = (each for each in preflight(case).issues if each.key == "laws.wall_drag")
+    assert issue.severity == "warning" and "nijssen" in issue.remedy
+    assert f"steps of {step} s where the gap is below {gap} radii" in issue.reason
+    for changes in ({"laws.lubrication": "nijssen"}, {"fluid.viscosity": 1e-5}, {"laws.wall_drag": "none"}):
+        assert "laws.wall_drag" not in {each.key for each in preflight(case.with_(**changes)).issues}
+
+
 def test_drag_beside_solid_cells_that_the_grid_counts_again_is_warned_of() -> None:
     """Beside flat sides of the box and smooth walls it is taken out."""
-    settling = GALLERY["settling"].with_(**{"column.sides": "no_slip", "laws.wall_drag": "nearest"})
+    walls = {"column.sides": "no_slip", "laws.wall_drag": "nearest", "laws.lubrication": "nijssen"}
+    settling = GALLERY["settling"].with_(**walls)
     for case in (GALLERY["settling"], settling.with_(vessel={"shape": "cylinder"})):
         assert not [each for each in preflight(case).issues if each.key == "laws.wall_drag"]
     round_column = preflight(settling.with_(**{"column.shape": "cylinder"})).issues

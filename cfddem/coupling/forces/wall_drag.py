@@ -31,10 +31,7 @@ from cfddem.particles.walls.arrays import wall_arrays
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.nearest_point import nearest
 from cfddem.particles.walls.wall import Wall
-from closures.wall_drag import along_wall, film_along_wall, towards_wall
-
-CLOSEST = 1e-4
-"""Gap over the radius, at least; what grows further is in the films."""
+from closures.wall_drag import CLOSEST, along_wall, film_along_wall, towards_wall
 
 
 class WallTerms(NamedTuple):
