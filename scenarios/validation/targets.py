@@ -26,6 +26,7 @@ TARGETS: dict[str, str] = {
     "beds": "scenarios.validation.beds",
     "lubrication": "scenarios.beds.lubrication_study.validation",
     "bed-steps": "scenarios.beds.lubrication_study.steps",
+    "gas-bed-steps": "scenarios.validation.gas_bed_steps",
     "film-map": "scenarios.validation.film_map.study",
     "film-impact": "scenarios.collisions.film_impact.validation",
     "wet-tumbler": "scenarios.collisions.wet_tumbler.validation",
@@ -41,10 +42,10 @@ TARGETS: dict[str, str] = {
 }
 """Name of each target, and the module that holds its `study`."""
 
-ONLY_IF_NAMED = ("resolved", "wet-beds", "bed-steps", "film-map")
+ONLY_IF_NAMED = ("resolved", "wet-beds", "bed-steps", "gas-bed-steps", "film-map")
 """Targets that take up to a day; `all` leaves them out."""
 
-PIECEMEAL = ("wet-beds", "bed-steps", "film-map")
+PIECEMEAL = ("wet-beds", "bed-steps", "gas-bed-steps", "film-map")
 """Targets that make their table of what has been computed, and go on with the rest another time."""
 
 
