@@ -290,10 +290,9 @@ def liquid() -> RefinementBed:
 
 
 def gas() -> RefinementBed:
-    """Slugs of air in the narrow column of the gallery's ramp, with smeared surfaces."""
+    """Slugs of air in the narrow column of the gallery's ramp."""
     case = gallery()["defluidisation"]
     changes = {"title": "Slugging bed, for refinement", "bed.inlet_velocity": 0.6, "run.every": 0.25}
-    changes["laws.surface"] = "smeared"
     return RefinementBed(case.with_(**changes), 1.0, 6.0)
 
 
