@@ -1,16 +1,19 @@
 """Whether a small gas bed with sharp surfaces depends on its fluid step, its cells and its kernel.
 
 It has 2 000 seeds of the case `gas-bed`, 12 diameters high in a square column of 12 diameters, and slugs. Every run has
-the same seed, so that the errors are those of time alone. Runs are kept as folders: interrupted runs are continued, and
-finished runs are not repeated.
+the same seed, so that the errors are those of time alone. The bed drifts for seconds, so that every run is compared
+with the bed as it is over the same time. Runs are kept as folders: interrupted runs are continued, and finished runs
+are not repeated.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,11 +32,12 @@ EDGE = 0.0144
 """Width and depth of the column [m]: five cells of 2.40 diameters, or seven of 1.71."""
 
 
-class Variant(NamedTuple):
+@dataclass(frozen=True)
+class Variant:
     """A run of the bed with other steps, cells or kernel."""
 
     name: str
-    changes: dict[str, Any]
+    changes: dict[str, float] = field(hash=False)
     until: float  # [s]
 
 
@@ -64,6 +68,15 @@ class Means(NamedTuple):
     carried: Value  # by gas and floor together, likewise
 
 
+QUANTITIES = {
+    "mean height": "m",
+    "pressure drop over weight": "-",
+    "its deviation in time": "-",
+    "pressure drop and wall load over weight": "-",
+}
+"""Names of the means, in their order, with their units."""
+
+
 def bed() -> Case:
     """The small bed, with sharp surfaces, the default."""
     return mueller().with_(**{
@@ -87,8 +100,12 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
                 if mine:
                     finished(bed(), folder, home(variant), progress, variant.changes | {"run.until": variant.until})
     begun = [variant for variant in VARIANTS if (folder / home(variant) / "run.json").exists()]
-    runs = {variant.name: open_run(folder / home(variant)) for variant in begun}
-    return table({name: means(run) for name, run in runs.items() if run.status == "finished"})
+    opened = {variant: open_run(folder / home(variant)) for variant in begun}
+    runs = {variant: run for variant, run in opened.items() if run.status == "finished"}
+    usual = runs.get(VARIANTS[0])
+    return table({
+        variant: (means(run, variant.until), usual and means(usual, variant.until)) for variant, run in runs.items()
+    })  # fmt: skip
 
 
 def home(variant: Variant) -> str:
@@ -100,11 +117,11 @@ def home(variant: Variant) -> str:
     return variant.name.replace(",", "").replace(" ", "_")
 
 
-def means(run: RunData) -> Means:
-    """Means of a run, with the errors of blocks of a slug each."""
+def means(run: RunData, until: float) -> Means:
+    """Means of a run to a time [s], with the errors of blocks of a slug each."""
     history, case = run.history, Case.from_text(run.case_text)
     weight = buoyant_weight(case) / case.column.floor_area
-    inside = history["time"] > BEGIN
+    inside = (history["time"] > BEGIN) & (history["time"] < until + 1e-9)
     drop, floor = (history[name][inside] / weight for name in ("pressure_drop", "wall_load"))
     slugs = ((history["time"][inside] - BEGIN) / SLUG).astype(int)
     variance = blocked((drop - drop.mean()) ** 2, slugs)
@@ -124,16 +141,13 @@ def blocked(values: np.ndarray, blocks: np.ndarray) -> Value:
     return Value(float(values.mean()), float(np.std(parts, ddof=1) / math.sqrt(len(parts))))
 
 
-def table(found: dict[str, Means]) -> list[Row]:
-    """Every mean, beside that of the bed as it is."""
-    usual, rows = found.get(VARIANTS[0].name), []
-    for name, each in found.items():
-        for quantity, unit, value, other in (
-            ("mean height", "m", each.height, usual and usual.height),
-            ("pressure drop over weight", "-", each.drop, usual and usual.drop),
-            ("its deviation in time", "-", each.deviation, usual and usual.deviation),
-            ("pressure drop and wall load over weight", "-", each.carried, usual and usual.carried),
-        ):
-            reference = other.mean if other and each is not usual else None
-            rows.append(Row(f"{name}: {quantity}", value.mean, reference, unit=unit, note=f"error {value.error:.2g}"))
+def table(by_variant: Mapping[Variant, tuple[Means, Means | None]]) -> list[Row]:
+    """Every mean, beside that of the bed as it is over the same time."""
+    rows = []
+    for variant, (own, usual) in by_variant.items():
+        for place, (quantity, unit) in enumerate(QUANTITIES.items()):
+            value, other = own[place], usual[place] if usual and variant.changes else None
+            note = f"error {value.error:.2g}" + (f", of the reference {other.error:.2g}" if other else "")
+            name = f"{variant.name}, {variant.until:g} s: {quantity}"
+            rows.append(Row(name, value.mean, other.mean if other else None, unit=unit, note=note))
     return rows

@@ -33,11 +33,12 @@ def test_an_error_is_that_of_whole_slugs() -> None:
     assert blocked(blocks.astype(float), blocks).error == pytest.approx(np.std(range(9), ddof=1) / 3.0)
 
 
-def test_every_mean_stands_beside_that_of_the_bed_as_it_is() -> None:
-    usual, other = (Means(*(Value(share * size, 0.1) for size in (0.02, 0.9, 0.3, 1.0))) for share in (1.0, 1.1))
-    rows = table({VARIANTS[0].name: usual, VARIANTS[2].name: other})
+def test_every_mean_stands_beside_that_of_the_bed_as_it_is_over_the_same_time() -> None:
+    first, second = (Means(*(Value(share * size, 0.1) for size in (0.02, 0.9, 0.3, 1.0))) for share in (1.0, 1.1))
+    rows = table({VARIANTS[0]: (first, first), VARIANTS[2]: (second, first)})
     assert [row.reference for row in rows] == [None] * 4 + [0.02, 0.9, 0.3, 1.0]
-    assert rows[4].quantity == "0.5 ms, 1.71 d: mean height" and rows[4].value == pytest.approx(0.022)
+    assert rows[4].quantity == "0.5 ms, 1.71 d, 2.2 s: mean height" and rows[4].value == pytest.approx(0.022)
+    assert table({VARIANTS[2]: (second, None)})[0].reference is None
 
 
 def test_no_run_begins_after_the_hours(tmp_path: Path) -> None:
