@@ -104,7 +104,8 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
     runs = {variant: run for variant, run in opened.items() if run.status == "finished"}
     usual = runs.get(VARIANTS[0])
     return table({
-        variant: (means(run, variant.until), usual and means(usual, variant.until)) for variant, run in runs.items()
+        variant: (means(run, variant.until), means(usual, variant.until) if usual else None)
+        for variant, run in runs.items()
     })  # fmt: skip
 
 
