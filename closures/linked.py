@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from llvmlite.binding import Linkage
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.environment import lookup_environment
@@ -26,13 +27,18 @@ class _WithoutAddresses:
 
 
 class _Code(JITCodeLibrary):  # type: ignore[misc]
-    """Code that is optimised once, where it is whole: not each function before it is linked, too."""
+    """Code that is linked and optimised once, where it is whole: not in each function before it is linked, too."""
 
     def _optimize_functions(self, module: Any) -> None:
         if not hasattr(self._codegen, "_data_layout"):
             super()._optimize_functions(module)  # type: ignore[no-untyped-call]
             return
         module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        """Link and optimise."""
+        self._linking_libraries = [_Alone(each) if _is_inlined(each) else each for each in _callers_first(self)]
+        super().finalize()  # type: ignore[no-untyped-call]
 
 
 class _LinkedCode(_Code):
@@ -46,19 +52,62 @@ class _LinkedCode(_Code):
         """Where addresses are set."""
         return _WithoutAddresses
 
-    def _optimize_final_module(self) -> None:
-        if not self.inlined:
-            super()._optimize_final_module()  # type: ignore[no-untyped-call]
+    def finalize(self) -> None:
+        """Link and optimise what is not part of a whole."""
+        if self.inlined:
+            self._finalize_final_module()
+        else:
+            super().finalize()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
-        self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"  # one of several definitions, left out where nothing calls it
         self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        if self.inlined and self._shared_module is None:  # for loops on all threads, whose pieces are of other classes
+            self._shared_module = self._final_module.clone()
+            for each in _callers_first(self):
+                self._shared_module.link_in(_Alone(each)._get_module_for_linking(), preserve=True)
+        return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
 
     def get_pointer_to_function(self, name: str) -> int:
         """Address of a function: none."""
         self._ensure_finalized()  # type: ignore[no-untyped-call]
         return 0
+
+
+class _Alone:
+    """An inlined function without those that it calls, which are linked beside it, each once."""
+
+    def __init__(self, library: Any) -> None:
+        self._library, self._reload_init = library, library._reload_init
+
+    def _get_module_for_linking(self) -> Any:
+        return self._library._final_module if _is_inlined(self._library) else self._library._get_module_for_linking()
+
+
+def _is_inlined(library: Any) -> bool:
+    return getattr(library, "inlined", False)
+
+
+def _callers_first(library: Any) -> list[Any]:
+    """What a function calls, and what its inlined parts call: the linker takes only what has been called before."""
+    found: dict[Any, None] = {}
+
+    def follow(caller: Any) -> None:
+        for each in caller._linking_libraries:
+            if each not in visited:
+                visited.add(each)
+                if _is_inlined(each):
+                    follow(each)
+                found[each] = None
+
+    visited: set[Any] = {library}
+    follow(library)
+    return list(found)[::-1]
 
 
 class _CalledCode(_Code):

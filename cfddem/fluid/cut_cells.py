@@ -11,7 +11,7 @@ wall, and that of its square, from which `cfddem.fluid.near_walls` takes gradien
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -86,7 +86,7 @@ def _refuse_hidden_walls(grid: Grid, surface: Surface) -> None:
         low[2 - d], high[2 - d] = slice(None, -1), slice(1, None)
         both = is_open[tuple(low)] & is_open[tuple(high)]
         points = [c[tuple(high)] - 0.5 * grid.spacing[d] * (n == d) for n, c in enumerate(centres)]
-        share = section(surface, points, d, grid.spacing).share
+        share = _share(surface, points, d, grid.spacing)
         parted[d][tuple(high)] = ~(both & (share > SMALLEST_APERTURE))
     # regions that faces join, and those that touch
     joined, touching = _regions(is_open, parted), label(is_open)[1]
@@ -129,14 +129,30 @@ def section(surface: Surface, points: Sequence[Array], axis: int, spacing: Seque
     """
     centre = surface.distance(*points)
     whole = (centre > 0.0).astype(float), centre.copy(), centre**2, np.array(surface.velocity(*points)[axis])
-    near = np.flatnonzero(np.abs(centre) < REACH * float(np.linalg.norm(spacing)))
+    return Section(*_with_cuts(whole, centre, REACH * float(np.linalg.norm(spacing)), surface, points, axis, spacing))
+
+
+def _share(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence[float]) -> Array:
+    """Open share of sections; those farther from the wall than their corners are whole."""
+    centre = surface.distance(*points)
+    corner = 0.5 * float(np.linalg.norm([h for d, h in enumerate(spacing) if d != axis]))
+    whole = ((centre > 0.0).astype(float),)
+    return _with_cuts(whole, centre, 1.001 * corner, surface, points, axis, spacing)[0]
+
+
+def _with_cuts(
+    whole: tuple[Array, ...], centre: Array, reach: float,
+    surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence[float],
+) -> tuple[Array, ...]:  # fmt: skip
+    """Fields of sections, of which those whose centre lies within reach of the wall are cut."""
+    near = np.flatnonzero(np.abs(centre) < reach)
     flat = [np.ravel(coordinate) for coordinate in points]
     for begin in range(0, near.size, AT_ONCE):
         here = near[begin : begin + AT_ONCE]
         cut = _cut(surface, [coordinate[here] for coordinate in flat], axis, spacing)
         for values, of_these in zip(whole, cut):
             values.ravel()[here] = of_these
-    return Section(*whole)
+    return whole
 
 
 def _cut(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence[float]) -> Section:
@@ -148,13 +164,19 @@ def _cut(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence
     at[second] = at[second] + spacing[second] * lattice
     shape = (points[0].size, PARTS + 1, PARTS + 1)
     at = list(np.broadcast_arrays(*at))
-    fields = np.stack([np.broadcast_to(field, shape) for field in (surface.distance(*at), surface.velocity(*at)[axis])])
+    distance = np.broadcast_to(surface.distance(*at), shape)
+    open_somewhere = (distance > 0.0).any(axis=(1, 2))
+    at = [coordinate[open_somewhere] for coordinate in at]
+    distance = distance[open_somewhere]
+    fields = np.stack([distance, np.broadcast_to(surface.velocity(*at)[axis], distance.shape)])
     a, b, c, e = fields[..., :-1, :-1], fields[..., 1:, :-1], fields[..., :-1, 1:], fields[..., 1:, 1:]
     halves = [_triangle(a, b, e), _triangle(a, c, e)]
     share, mean, square, sliding = (0.5 * (p + q).mean(axis=(1, 2)) for p, q in zip(*halves))
     some = np.maximum(share, 1e-300)
     share = np.where(share > 1.0 - 1e-12, 1.0, np.where(share < SMALLEST_APERTURE, 0.0, share))
-    return Section(share, mean / some, square / some, sliding / some)
+    result = np.zeros((4, points[0].size))
+    result[:, open_somewhere] = share, mean / some, square / some, sliding / some
+    return Section(*result)
 
 
 def _triangle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array, Array]:
@@ -183,14 +205,26 @@ def _triangle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array, Array]
 
 def volumes(surface: Surface, spacing: Sequence[float], *centres: Array) -> Array:
     """Share of cells that is open, around centres x, y, z of one shape [m]."""
-    return contents(surface, spacing, *centres)[0]
+    total = np.zeros(centres[0].shape)
+    for here, points, axis in _sections_of_cells(surface, spacing, centres):
+        total[here] += _share(surface, points, axis, spacing) / PARTS
+    return np.where(total > 1.0 - 1e-12, 1.0, total)
 
 
 def contents(surface: Surface, spacing: Sequence[float], *centres: Array) -> tuple[Array, Array]:
-    """Share of cells that is open, around centres x, y, z of one shape [m], and its mean distance from the wall [m].
+    """Share of cells that is open, around centres x, y, z of one shape [m], and its mean distance from the wall [m]."""
+    total, distance = np.zeros((2, *centres[0].shape))
+    for here, points, axis in _sections_of_cells(surface, spacing, centres):
+        cut = section(surface, points, axis, spacing)
+        total[here] += cut.share / PARTS
+        distance[here] += cut.share * cut.distance / PARTS
+    return np.where(total > 1.0 - 1e-12, 1.0, total), distance / np.maximum(total, 1e-300)
 
-    Means of several sections, along the axis that the wall is most parallel to.
-    """
+
+def _sections_of_cells(
+    surface: Surface, spacing: Sequence[float], centres: Sequence[Array]
+) -> Iterator[tuple[NDArray[np.bool_], list[Array], int]]:
+    """Several sections of every cell, along the axis that the wall is most parallel to: cells, centres, axis."""
     x, y, z = centres
     step = 1e-3 * min(spacing)
     slope = np.stack([
@@ -198,16 +232,13 @@ def contents(surface: Surface, spacing: Sequence[float], *centres: Array) -> tup
                - surface.distance(x - step * (d == 0), y - step * (d == 1), z - step * (d == 2)))
         for d in range(3)
     ])  # fmt: skip
-    along, total, distance = np.argmin(slope, axis=0), np.zeros(x.shape), np.zeros(x.shape)
+    along = np.argmin(slope, axis=0)
     for d in range(3):
         here = along == d
         for part in range(PARTS):
             points = [coordinate[here] for coordinate in centres]
             points[d] = points[d] + spacing[d] * ((part + 0.5) / PARTS - 0.5)
-            cut = section(surface, points, d, spacing)
-            total[here] += cut.share / PARTS
-            distance[here] += cut.share * cut.distance / PARTS
-    return np.where(total > 1.0 - 1e-12, 1.0, total), distance / np.maximum(total, 1e-300)
+            yield here, points, d
 
 
 # ---------------------------------------------------------------- the geometry that a solver uses

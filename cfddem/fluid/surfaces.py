@@ -10,7 +10,7 @@ may slide along itself: it then has a velocity, which the fluid takes over where
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
@@ -154,7 +154,7 @@ class Together:
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: that of the nearest wall."""
-        return _of_first(self.walls, [np.abs(wall.distance(x, y, z)) for wall in self.walls], x, y, z)
+        return _of_first(self.walls, lambda wall: np.abs(wall.distance(x, y, z)), x, y, z)
 
 
 @dataclass(frozen=True)
@@ -172,19 +172,23 @@ class Joined:
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: that of the wall whose distance counts."""
-        return _of_first(self.walls, [-wall.distance(x, y, z) for wall in self.walls], x, y, z)
+        return _of_first(self.walls, lambda wall: -wall.distance(x, y, z), x, y, z)
 
 
 def _of_first(
-    walls: Sequence[Surface], ranks: Sequence[Array], x: Array, y: Array, z: Array
+    walls: Sequence[Surface], rank: Callable[[Surface], Array], x: Array, y: Array, z: Array
 ) -> tuple[Array, Array, Array]:
     """Velocity of the wall of the lowest rank at every place; of equal ranks, that of the first."""
     shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
+    velocities = [wall.velocity(x, y, z) for wall in walls]
     lowest, velocity = np.full(shape, np.inf), [np.zeros(shape) for _ in range(3)]
-    for wall, rank in zip(walls, ranks):
-        for d, component in enumerate(wall.velocity(x, y, z)):
-            velocity[d] = np.where(rank < lowest, component, velocity[d])
-        lowest = np.minimum(lowest, rank)
+    if not any(component.any() for components in velocities for component in components):
+        walls = ()  # all are at rest, whichever is first
+    for wall, components in zip(walls, velocities):
+        ranked = rank(wall)
+        for d, component in enumerate(components):
+            velocity[d] = np.where(ranked < lowest, component, velocity[d])
+        lowest = np.minimum(lowest, ranked)
     return velocity[0], velocity[1], velocity[2]
 
 

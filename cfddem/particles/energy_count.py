@@ -35,6 +35,7 @@ from cfddem.particles.energy_of_contacts import (
     count_work,
     keep_motion,
 )
+from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 from cfddem.particles.vectors import flat
@@ -108,13 +109,17 @@ class Energies(ParticleFeature):
 
     name, every_step = "energies", True
 
-    def __init__(self, engine: Engine) -> None:
-        laws = engine.laws
+    @staticmethod
+    def check(laws: Laws) -> None:
+        """Refuse laws whose work is not counted; asked before their loops are compiled."""
         if laws.contact_law.energy is None:
             name = laws.contact_law.name
             raise InputError("energies", None, "a contact law that gives its energy", f"the law {name!r} does not")
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
+
+    def __init__(self, engine: Engine) -> None:
+        laws = engine.laws
         self._work, self._motion = specialise(count_work, engine.choices), specialise(count_motion, engine.choices)
         choices = engine.choices
         bridges = DRYING_BRIDGES if choices["DRYING"] else BRIDGES

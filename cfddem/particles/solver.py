@@ -122,6 +122,8 @@ class ParticleSolver:
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()
+        if settings.energies:
+            Energies.check(self.laws)
         recorded = (*RECORD_FIELDS, *self.laws.bridges.collision_memory) if record else ()
         self.pair_fields = [*self.laws.fields(), *recorded]
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
