@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core import event
 from numba.core.targetconfig import Option, TargetConfig
 
 from cfddem.backend.compile import inline, part, prange, serial, threaded_part, use_threads
@@ -146,6 +147,12 @@ def test_a_version_without_the_replaced_parts_gives_the_same_numbers(replaced: b
         [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     assert done.stdout.strip() == sum(np.sqrt(1.0 + np.arange(5.0))).hex(), done.stderr
+
+
+def test_nobody_is_told_each_time_that_llvm_is_called() -> None:
+    with event.install_recorder("numba:llvm_lock") as reports:
+        inline(raised.py_func).compile("(float64, boolean)")
+    assert not reports.buffer
 
 
 def test_settings_are_compared_by_what_is_set_and_else_as_the_compiler_does() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cfddem.backend.errors import InputError
 from cfddem.fluid.budgets import continuity_residual
 from cfddem.fluid.conditions import Inlet, Outlet, Periodic
-from cfddem.fluid.cut_cells import within
+from cfddem.fluid.cut_cells import contents, volumes, within
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.near_walls import NoWalls
 from cfddem.fluid.solver import FluidSolver, Scheme
@@ -32,6 +32,18 @@ def pipe(n: int, shift: tuple[float, float]) -> float:
     fluid.run_until(0.8)
     flux = float(fluid.volume_flux(2)[0].sum()) * h * h
     return abs(flux / (math.pi * fall * radius**4 / (8.0 * viscosity)) - 1.0)
+
+
+@pytest.mark.parametrize("spacing", [(0.1, 0.1, 0.1), (0.05, 0.08, 0.13)])
+def test_volumes_of_cells_are_those_of_sections_that_are_cut_farther_from_the_wall(spacing):
+    """Bit for bit, for a cone that turns about a rod, over a floor that slants."""
+    cone = turned([(0.0, 0.1), (0.5, 0.6), (1.0, 0.6)], (0.51, 0.53, 0.0), spin=2.0)
+    rod = cylinder((0.51, 0.53, 0.0), 0.11, inside=False)
+    walls = together(cone, rod, Plane((0.5, 0.5, 0.2), (0.2, 0.1, 1.0)))
+    centres = np.meshgrid(*(h * (np.arange(int(1.1 / h)) + 0.5) for h in spacing), indexing="ij")
+    found = volumes(walls, spacing, *centres)
+    assert 0.1 < np.mean((found > 0.0) & (found < 1.0)) < 0.9
+    assert np.array_equal(found, contents(walls, spacing, *centres)[0])
 
 
 def test_the_flux_through_a_pipe_of_8_cells_is_met():
