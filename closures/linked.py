@@ -38,7 +38,7 @@ class _Code(JITCodeLibrary):  # type: ignore[misc]
 
     def finalize(self) -> None:
         """Link and optimise."""
-        self._linking_libraries = [_Alone(each) if _is_inlined(each) else each for each in _callers_first(self)]
+        self._linking_libraries = [_Alone(part) if _is_inlined(part) else part for part in _callers_first(self)]
         super().finalize()  # type: ignore[no-untyped-call]
 
 
@@ -70,8 +70,8 @@ class _LinkedCode(_Code):
     def _get_module_for_linking(self) -> Any:
         if self.inlined and self._shared_module is None:  # for loops on all threads, whose pieces are of other classes
             self._shared_module = self._final_module.clone()
-            for each in _callers_first(self):
-                self._shared_module.link_in(_Alone(each)._get_module_for_linking(), preserve=True)
+            for part in _callers_first(self):
+                self._shared_module.link_in(_Alone(part)._get_module_for_linking(), preserve=True)
         return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
 
     def get_pointer_to_function(self, name: str) -> int:
@@ -96,19 +96,18 @@ def _is_inlined(library: Any) -> bool:
 
 def _callers_first(library: Any) -> list[Any]:
     """What a function calls, and what its inlined parts call: the linker takes only what has been called before."""
-    found: dict[Any, None] = {}
+    visited, callees_first = {library}, list[Any]()
 
     def follow(caller: Any) -> None:
-        for each in caller._linking_libraries:
-            if each not in visited:
-                visited.add(each)
-                if _is_inlined(each):
-                    follow(each)
-                found[each] = None
+        for callee in caller._linking_libraries:
+            if callee not in visited:
+                visited.add(callee)
+                if _is_inlined(callee):
+                    follow(callee)
+                callees_first.append(callee)
 
-    visited: set[Any] = {library}
     follow(library)
-    return list(found)[::-1]
+    return callees_first[::-1]
 
 
 class _CalledCode(_Code):
