@@ -19,9 +19,9 @@ ROOMS = (
 )  # fmt: skip
 """Order of the folders: loops of particles first, those of the fluid last, and between them tests that compile little.
 
-Two workers begin at the two ends and meet between them. What several loops have in common is compiled once in each
-process that compiles one of them; with the tests of all loops mixed among both workers, they took 1.4 times as long to
-compile.
+Two workers begin at the two ends and meet between them. What several loops have in common is compiled in each process
+that compiles one of them: loops of nine files of contacts, films and bridges took 1.4 times as long to compile in two
+mixed workers as in one process.
 """
 
 
