@@ -138,8 +138,10 @@ class Balance(NamedTuple):
 
 
 @threaded
-def transport(velocity, voidage, viscosity, buried, medium, flux, expansion, rate):
-    """rate = div(eps tau) - div(rho eps u u) on every face of the box; also writes flux and expansion.
+def transport(stretches, velocity, voidage, viscosity, buried, medium, flux, expansion, rate):
+    """rate = div(eps tau) - div(rho eps u u) on faces away from smooth walls; also writes flux and expansion.
+
+    stretches  `FluidStretches`
 
     velocity, flux (eps u), rate (3, ...); voidage, viscosity (eps mu [Pa s]), expansion (2/3 eps mu div u)
     padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half
@@ -151,29 +153,30 @@ def transport(velocity, voidage, viscosity, buried, medium, flux, expansion, rat
     velocity, flux = velocity.reshape(3, -1), flux.reshape(3, -1)
     buried, rate = buried.reshape(3, -1), rate.reshape(3, -1)
     moving = velocity, flux, viscosity, buried
-    for k in prange(LOW - 1, shape[0] - LOW + 1):
-        at, n = inside(k, shape, 1)
-        for d in range(3):
-            here, before = line(voidage, at, n), line(voidage, at - step[d], n)
-            out, u = line(flux[d], at, n), line(velocity[d], at, n)
+    for k in prange(shape[0]):
+        for part in range(stretches.around.first[k], stretches.around.first[k + 1]):
+            at, n = stretches.around.at[part], stretches.around.count[part]
+            for d in range(3):
+                here, before = line(voidage, at, n), line(voidage, at - step[d], n)
+                out, u = line(flux[d], at, n), line(velocity[d], at, n)
+                for i in range(n):
+                    out[i] = 0.5 * (here[i] + before[i]) * u[i]
+            out, effective_viscosity = line(expansion, at, n), line(viscosity, at, n)
+            u0, u1 = line(velocity[0], at, n), line(velocity[0], at + step[0], n)
+            v0, v1 = line(velocity[1], at, n), line(velocity[1], at + step[1], n)
+            w0, w1 = line(velocity[2], at, n), line(velocity[2], at + step[2], n)
             for i in range(n):
-                out[i] = 0.5 * (here[i] + before[i]) * u[i]
-        out, effective_viscosity = line(expansion, at, n), line(viscosity, at, n)
-        u0, u1 = line(velocity[0], at, n), line(velocity[0], at + step[0], n)
-        v0, v1 = line(velocity[1], at, n), line(velocity[1], at + step[1], n)
-        w0, w1 = line(velocity[2], at, n), line(velocity[2], at + step[2], n)
-        for i in range(n):
-            growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
-            out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
-    # The high boundary face of a direction is the low face of the first ghost cell: one more than cells.
-    for k in prange(LOW, shape[0] - LOW):
-        at, n = inside(k, shape, 0)
-        for d in range(3):
-            out, right, left = line(rate[d], at, n), line(expansion, at, n), line(expansion, at - step[d], n)
-            for i in range(n):
-                out[i] = (left[i] - right[i]) * inverse[d]
-            for e in range(3):
-                _balance(out, moving, at, step, medium, d, e)
+                growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
+                out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
+    for k in prange(shape[0]):
+        for part in range(stretches.whole.first[k], stretches.whole.first[k + 1]):
+            at, n = stretches.whole.at[part], stretches.whole.count[part]
+            for d in range(3):
+                out, right, left = line(rate[d], at, n), line(expansion, at, n), line(expansion, at - step[d], n)
+                for i in range(n):
+                    out[i] = (left[i] - right[i]) * inverse[d]
+                for e in range(3):
+                    _balance(out, moving, at, step, medium, d, e)
 
 
 @vector_inline
@@ -224,9 +227,10 @@ def _balance(out, moving, at, step, medium, along, across):
 
 
 @threaded
-def predict(balance, medium, step, weight_b, new, mobility):
+def predict(stretches, balance, medium, step, weight_b, new, mobility):
     """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
 
+    stretches      of faces with an unknown velocity
     weight_b       of the second of both forces
     new, mobility  (3, ...) [m/s] and [m2 s/kg]
     """
@@ -238,13 +242,14 @@ def predict(balance, medium, step, weight_b, new, mobility):
     rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
     old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
     times, cells = (step, weight_b), (voidage, centred, stored, drag, pressure)
-    for k in prange(LOW, shape[0] - LOW):
-        at, n = inside(k, shape, 0)
-        for d in range(3):
-            place = at, at - steps[d], d
-            out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
-            faces, forces = (old[d], rate_a[d], rate_b[d], solved[d]), (drag_momentum[d], source[d], driving[d])
-            _predict_line(out, mobility_here, cells, faces, forces, place, medium, times)
+    for k in prange(shape[0]):
+        for part in range(stretches.first[k], stretches.first[k + 1]):
+            at, n = stretches.at[part], stretches.count[part]
+            for d in range(3):
+                place = at, at - steps[d], d
+                out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
+                faces, forces = (old[d], rate_a[d], rate_b[d], solved[d]), (drag_momentum[d], source[d], driving[d])
+                _predict_line(out, mobility_here, cells, faces, forces, place, medium, times)
 
 
 @vector_inline

@@ -25,7 +25,7 @@ import numpy as np
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.cut_cells import CutCells, section
 from cfddem.fluid.fields import CellFields
-from cfddem.fluid.grid import Array, on_faces
+from cfddem.fluid.grid import Array, Grid, on_faces
 from cfddem.fluid.momentum import implicitness
 from cfddem.fluid.near_walls_loops import BLOCK, FULL, cut_transport, hold_near_walls, shut
 
@@ -73,6 +73,10 @@ class NoWalls:
 
     profiles: Sequence[Profiles] = ()
 
+    def near(self, grid: Grid) -> Any:
+        """Whether `replace` writes a face, padded (3, nz, ny, nx)."""
+        return np.zeros((3, *grid.padded_shape), bool)
+
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """Write convection and viscous stress near walls."""
 
@@ -100,6 +104,13 @@ class NearWalls(NoWalls):
         self.components = [_faces_of(cut, d, solved[d] > 0.0, self.profiles[d], outlets) for d in range(3)]
         self._resistance = [np.zeros(faces.stiff.size) for faces in self.components]
         self._cut = [_cut_faces(cut.aperture[e], e, self.components) for e in range(3)]
+
+    def near(self, grid: Grid) -> Any:
+        """See `NoWalls.near`."""
+        faces = super().near(grid)
+        for near, of_component in zip(faces.reshape(3, -1), self.components):
+            near[of_component.place.astype(np.int64) + 2 * of_component.steps[2]] = True
+        return faces
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """See `NoWalls.replace`; `fields.flux`, that of the velocity, becomes that through the open parts of faces."""

@@ -35,6 +35,7 @@ from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import Balance, FlowRates, Medium, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
+from cfddem.fluid.stretches import FluidStretches
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
 from cfddem.fluid.viscosity import EffectiveViscosity
 
@@ -134,8 +135,9 @@ class FluidSolver:
         self.open_cells = grid.open.astype(float)
         self._every_face = np.ones_like(self.faces.solved)
         self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(scheme.smagorinsky))
-        self._projection = Projection(sides, self.fields, communicator)
         self.walls = near_walls(sides, self.fields, self.faces.solved)
+        self._stretches = FluidStretches.of(self.faces.solved, self.walls.near(grid))
+        self._projection = Projection(sides, self.fields, self._stretches.solved, communicator)
         self._rates = FlowRates(sides, self.density, communicator)
         self.set_viscosity(viscosity)
         self.set_voidage(voidage)
@@ -226,8 +228,8 @@ class FluidSolver:
         fields = self.fields
         self._effective.update(velocity, voidage, fields.viscosity, fields.effective_viscosity)
         transport(
-            velocity, voidage, fields.effective_viscosity, self.faces.buried, medium, fields.flux, fields.expansion,
-            force,
+            self._stretches, velocity, voidage, fields.effective_viscosity, self.faces.buried, medium, fields.flux,
+            fields.expansion, force,
         )  # fmt: skip
         self.walls.replace(velocity, fields.effective_viscosity, medium.density, medium.central, force)
 
@@ -238,7 +240,8 @@ class FluidSolver:
     def _predict(self, new: Array, step: float, weight: float) -> None:
         """Write the velocity after the step with the pressure as it is; the second explicit force has this weight."""
         self.boundaries.fill_pressure(self.fields.pressure)
-        predict(self._balance(self.fields.velocity), self._medium, step, weight, new, self.fields.mobility)
+        stretches = self._stretches.solved
+        predict(stretches, self._balance(self.fields.velocity), self._medium, step, weight, new, self.fields.mobility)
         self.walls.hold(new, self.density, self.model_b, step, weight)
         self.boundaries.set_faces(new)
 
@@ -355,7 +358,8 @@ class FluidSolver:
         fields = self.fields
         for d in range(3):
             self.face_velocity(d)[:] = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
-        np.copyto(fields.velocity, self.boundaries.cut.beyond, where=self.faces.blocked)
+        for field in (fields.velocity, fields.other_velocity):
+            np.copyto(field, self.boundaries.cut.beyond, where=self.faces.blocked)
         np.copyto(fields.other_voidage, fields.mean_voidage)
         np.copyto(fields.new_voidage_rate, fields.voidage_rate)
         self.boundaries.set_inlets(self.time, fields.mean_voidage)

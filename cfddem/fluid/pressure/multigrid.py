@@ -72,6 +72,7 @@ class Level:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
         self.rows = np.zeros((2, *self.shape[::2]))  # of each plane two
+        self.wet = np.ones(self.shape[:2], bool)  # rows with unknowns; all values of the others stay zero
         self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
         self.small = self.x.size < SMALL
 
@@ -92,8 +93,8 @@ class Level:
         self.loop(coarsen)(tuple(of_fine), fine.factors, farther, coupled, tuple(of_coarse))
 
     def take_diagonal(self) -> None:
-        """Compute the diagonal and its inverse, zero in solid cells."""
-        self.loop(take_diagonal)(*self.coefficients, self.diagonal, self.inverse)
+        """Compute the diagonal and its inverse, zero in solid cells, and find the wet rows."""
+        self.loop(take_diagonal)(*self.coefficients, self.diagonal, self.inverse, self.wet)
 
     def loop(self, loop: Threaded) -> Any:
         """A loop as it runs over the cells of this level: on all threads, or on one if they are few."""
@@ -105,21 +106,21 @@ class Level:
 
     def relax(self, colour: int, halves: int, backward: bool) -> None:
         """Make so many halves of sweeps, beginning with a colour."""
-        matrix = self.ax, self.ay, self.az, self.inverse
+        matrix = self.ax, self.ay, self.az, self.inverse, self.wet
         self.loop(smooth)(self.x, self.b, matrix, self.rows[0], colour, halves, backward)
 
     def take_residual(self) -> None:
         """Compute the residual."""
-        self.loop(residual)(self.x, self.b, self.ax, self.ay, self.az, self.diagonal, self.image)
+        self.loop(residual)(self.x, self.b, self.ax, self.ay, self.az, self.diagonal, self.wet, self.image)
 
     def restrict_to(self, coarse: Level) -> None:
         """Write the right-hand side of the coarser grid."""
         self.take_residual()
-        self.loop(restrict)(self.image, self.factors, self.shift, self.rows[0], coarse.b)
+        self.loop(restrict)(self.image, self.wet, self.factors, self.shift, self.rows[0], coarse.b)
 
     def correct_by(self, coarse: Level) -> None:
         """Add the correction of the coarser grid."""
-        self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows[0], self.x)
+        self.loop(prolong)(coarse.x, self.wet, self.factors, self.shift, self.rows[0], self.x)
 
 
 class PressureEquation:
@@ -196,7 +197,7 @@ class PressureEquation:
             self.direction += finest.x
             self._apply_to_direction()
             length = product / self._product(self.direction, finest.image)
-            finest.loop(descend)(length, self.direction, finest.image, x, self.residual, self._largest)
+            finest.loop(descend)(length, self.direction, finest.image, finest.wet, x, self.residual, self._largest)
             left = self.communicator.largest(self._largest)
             iterations += 1
         self._remove_means(x)
@@ -209,17 +210,17 @@ class PressureEquation:
     def _apply_to_direction(self) -> None:
         """Write the image L d of the search direction d."""
         level = self.finest
-        level.loop(apply)(self.direction, level.ax, level.ay, level.az, level.diagonal, level.image)
+        level.loop(apply)(self.direction, level.ax, level.ay, level.az, level.diagonal, level.wet, level.image)
 
     def _product(self, a: Array, b: Array) -> float:
         """Sum of a b over the cells of all ranks; NaN where a product is not finite."""
         finest = self.finest
-        finest.loop(largest_products)(a, b, finest.rows, self._largest)
+        finest.loop(largest_products)(a, b, finest.wet, finest.rows, self._largest)
         largest = self.communicator.largest(self._largest)
         if not math.isfinite(largest):
             return math.nan
         unit = float(unit_of(largest))
-        finest.loop(split_products)(a, b, unit, finest.rows, self._parts)
+        finest.loop(split_products)(a, b, finest.wet, unit, finest.rows, self._parts)
         whole, fine, missing = self.communicator.sum(self._parts, axis=0)
         return math.nan if missing else float(put_together(np.array([whole, fine]), unit))
 

@@ -55,31 +55,35 @@ def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
 
 
 @threaded
-def take_diagonal(ax, ay, az, anchor, diagonal, inverse):
-    """Diagonal of L and its inverse, zero in solid cells."""
+def take_diagonal(ax, ay, az, anchor, diagonal, inverse, wet):
+    """Diagonal of L and its inverse, zero in solid cells; and whether a row (nz, ny) has other ones."""
     nz, ny, nx = ax.shape
     for k in prange(nz):
         above = neighbours(k, nz)[1]
         for j in range(ny):
-            back = neighbours(j, ny)[1]
+            back, largest = neighbours(j, ny)[1], 0.0
             for i in range(nx):
                 right = neighbours(i, nx)[1]
                 total = ax[k, j, i] + ay[k, j, i] + az[k, j, i] + anchor[k, j, i]
                 total = total + ax[k, j, right] + ay[k, back, i] + az[above, j, i]
                 diagonal[k, j, i] = total
                 inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
+                largest = max(largest, total)
+            wet[k, j] = largest > 0.0
 
 
 @vector_inline
 def _relax_plane(k, colour, backward, x, b, matrix, new):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
-    ax, ay, az, inverse = matrix
+    ax, ay, az, inverse, wet = matrix
     nz, ny, nx = x.shape
     below, above = neighbours(k, nz)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
     last, _ = neighbours(0, ny)
     for count in range(ny):
         j = (last if count == 0 else count - 1) if backward else count
+        if not wet[k, j]:
+            continue
         front, back = neighbours(j, ny)
         here, west, rhs, invert = x[k, j], ax[k, j], b[k, j], inverse[k, j]
         south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
@@ -103,7 +107,7 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
 def smooth(x, b, matrix, rows, first, halves, backward):
     """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten.
 
-    matrix  coefficients along x, y, z, and the inverse of the diagonal
+    matrix  coefficients along x, y, z, the inverse of the diagonal, and which rows are wet
     first   colour of the first half of a sweep
     halves  number of halves, of both colours in turn
     """
@@ -140,12 +144,13 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
 
 
 @threaded
-def residual(x, b, ax, ay, az, diagonal, left):
-    """left = b - L x."""
+def residual(x, b, ax, ay, az, diagonal, wet, left):
+    """left = b - L x in the wet rows."""
     for k in prange(x.shape[0]):
         for j in range(x.shape[1]):
-            _apply_row(k, j, x, ax, ay, az, diagonal, left[k, j])
-            _subtract_from(b[k, j], left[k, j])
+            if wet[k, j]:
+                _apply_row(k, j, x, ax, ay, az, diagonal, left[k, j])
+                _subtract_from(b[k, j], left[k, j])
 
 
 @vector_inline
@@ -163,9 +168,10 @@ def _add(values, row):
 
 
 @threaded
-def restrict(values, factors, shift, rows, coarse):
+def restrict(values, wet, factors, shift, rows, coarse):
     """Sum the values of a level over the cells that make one coarse cell; rows are overwritten.
 
+    wet    rows that have values
     shift  along x, y, z; cell k lies in the coarse cell (k + shift) // factor
     """
     nz, ny, nx = values.shape
@@ -177,7 +183,8 @@ def restrict(values, factors, shift, rows, coarse):
             total[:] = 0.0
             for k in range(first_plane, end_plane):
                 for j in range(first_row, end_row):
-                    _add(values[k, j], total)
+                    if wet[k, j]:
+                        _add(values[k, j], total)
             for ic in range(coarse.shape[2]):
                 first, end = _cells_in(ic, factors[0], shift[0], nx)
                 coarse[kc, jc, ic] = 0.0
@@ -186,8 +193,8 @@ def restrict(values, factors, shift, rows, coarse):
 
 
 @threaded
-def prolong(coarse_x, factors, shift, rows, x):
-    """Add the coarse correction to every cell below it; `shift` as of `restrict`; rows are overwritten."""
+def prolong(coarse_x, wet, factors, shift, rows, x):
+    """Add the coarse correction to every cell below it in wet rows; `shift` as of `restrict`; rows are overwritten."""
     nz, ny, nx = x.shape
     for kc in prange(coarse_x.shape[0]):
         correction = rows[kc]
@@ -198,23 +205,27 @@ def prolong(coarse_x, factors, shift, rows, x):
                 correction[i] = coarse_x[kc, jc, (i + shift[0]) // factors[0]]
             for k in range(first_plane, end_plane):
                 for j in range(first_row, end_row):
-                    _add(correction, x[k, j])
+                    if wet[k, j]:
+                        _add(correction, x[k, j])
 
 
 @threaded
-def apply(x, ax, ay, az, diagonal, out):
-    """out = L x."""
+def apply(x, ax, ay, az, diagonal, wet, out):
+    """out = L x in the wet rows."""
     for k in prange(x.shape[0]):
         for j in range(x.shape[1]):
-            _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
+            if wet[k, j]:
+                _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
 
 
 @threaded
-def descend(length, direction, image, x, residual, largest):
+def descend(length, direction, image, wet, x, residual, largest):
     """x += length direction, residual -= length image; largest[k] is the largest residual in plane k."""
     for k in prange(x.shape[0]):
         most = 0.0
         for j in range(x.shape[1]):
+            if not wet[k, j]:
+                continue
             for i in range(x.shape[2]):
                 x[k, j, i] += length * direction[k, j, i]
                 left = residual[k, j, i] - length * image[k, j, i]
@@ -224,12 +235,13 @@ def descend(length, direction, image, x, residual, largest):
 
 
 @threaded
-def largest_products(a, b, rows, largest):
+def largest_products(a, b, wet, rows, largest):
     """Largest magnitude of a b in each plane of two cell fields (nz, ny, nx); rows (2, nz, nx) are overwritten."""
     for k in prange(a.shape[0]):
         rows[0, k] = 0.0
         for j in range(a.shape[1]):
-            _take_largest(a[k, j], b[k, j], rows[0, k])
+            if wet[k, j]:
+                _take_largest(a[k, j], b[k, j], rows[0, k])
         most = 0.0
         for i in range(a.shape[2]):
             most = max(most, rows[0, k, i])
@@ -237,12 +249,13 @@ def largest_products(a, b, rows, largest):
 
 
 @threaded
-def split_products(a, b, unit, rows, parts):
+def split_products(a, b, wet, unit, rows, parts):
     """Sums of the two whole numbers of a b in each plane of two cell fields, and how many are not finite (nz, 3)."""
     for k in prange(a.shape[0]):
         rows[0, k] = rows[1, k] = 0.0
         for j in range(a.shape[1]):
-            _add_split(a[k, j], b[k, j], unit, rows[0, k], rows[1, k])
+            if wet[k, j]:
+                _add_split(a[k, j], b[k, j], unit, rows[0, k], rows[1, k])
         parts[k] = 0
         for i in range(a.shape[2]):  # sums over a row of the plane are below 2^53
             if abs(rows[0, k, i]) < math.inf:

@@ -20,9 +20,10 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.fields import CellFields
 from cfddem.fluid.grid import LOW, UNIT, Array
-from cfddem.fluid.momentum import inside, line, strides
+from cfddem.fluid.momentum import line, strides
 from cfddem.fluid.pressure.ranks import pressure_equation
 from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.stretches import Stretches
 
 
 class Projection:
@@ -30,14 +31,18 @@ class Projection:
 
     boundaries  of its grid
     fields      with the mobility of faces and the new rate of change of the voidage
+    stretches   of faces with an unknown velocity
     """
 
-    def __init__(self, boundaries: Boundaries, fields: CellFields, communicator: Communicator) -> None:
+    def __init__(
+        self, boundaries: Boundaries, fields: CellFields, stretches: Stretches, communicator: Communicator
+    ) -> None:
         self.boundaries, self.fields, self.communicator = boundaries, fields, communicator
         grid = self.grid = boundaries.grid
+        self._stretches = stretches
         closed_regions = ClosedRegions.of(grid, boundaries, communicator)
         self._equation = pressure_equation(grid, closed_regions, communicator, boundaries.periodic, boundaries.outlets)
-        self._open = grid.open.astype(float)
+        self._open, self._wet = grid.open.astype(float), grid.open.any(axis=2)  # local: rows of this rank
         self._areas = np.array([grid.face_area(d) for d in range(3)])
         self._inverse = 1.0 / np.array(grid.spacing)
         self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
@@ -55,8 +60,8 @@ class Projection:
             self.grid, self.boundaries, self.fields, self._equation, self._missing,
         )  # fmt: skip
         flow = Flow(
-            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, boundaries.halo.ends, self._areas,
-            self._inverse,
+            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, self._wet, boundaries.halo.ends,
+            self._areas, self._inverse,
         )  # fmt: skip
         assemble(flow, boundaries.cut.shares, fresh, (*equation.coefficients, missing))
         if fresh:
@@ -68,7 +73,7 @@ class Projection:
         if iterations:
             grid.inner(fields.correction)[:] = correction
             boundaries.fill_pressure(fields.correction, correction=True)
-            subtract_gradient(velocity, fields.mobility, fields.correction, self._inverse)
+            subtract_gradient(self._stretches, velocity, fields.mobility, fields.correction, self._inverse)
             fields.owned("pressure")[:] += correction
         boundaries.fill_velocity(velocity)
         return iterations
@@ -80,6 +85,7 @@ class Flow(NamedTuple):
     velocity, mobility  padded faces
     voidage, rate       padded cells; rate is d eps/dt [1/s]
     open_cells          (nz, ny, nx) 1 where open
+    wet                 (nz, ny) whether a row has open cells
     ends                (3, 2) where the box ends below and above along x, y, z
     areas, inverse      of faces normal to x, y, z [m2], and 1/spacing [1/m]
     """
@@ -89,6 +95,7 @@ class Flow(NamedTuple):
     voidage: Array
     rate: Array
     open_cells: Array
+    wet: Any
     ends: Any
     areas: Array
     inverse: Array
@@ -141,6 +148,8 @@ def assemble(flow, shares, fresh, equation):
     nz, ny, nx = flow.open_cells.shape
     for k in prange(nz):
         for j in range(ny):
+            if not flow.wet[k, j]:
+                continue
             row = k + LOW, j + LOW, LOW
             balance_row(flow, shares, row, flow.open_cells[k, j], b[k, j])
             if fresh:
@@ -210,14 +219,15 @@ def take_high_side(flow, shares, d, low, high, anchor):
 
 
 @threaded
-def subtract_gradient(new, mobility, correction, inverse):
-    """Subtract mobility times the gradient of the pressure correction from the velocity."""
+def subtract_gradient(stretches, new, mobility, correction, inverse):
+    """Subtract mobility times the gradient of the pressure correction from the velocity, on stretches of faces."""
     shape, steps = correction.shape, strides(correction.shape)
     new, mobility, correction = new.reshape(3, -1), mobility.reshape(3, -1), correction.reshape(-1)
-    for k in prange(LOW, shape[0] - LOW):
-        at, n = inside(k, shape, 0)
-        for d in range(3):
-            right, left = line(correction, at, n), line(correction, at - steps[d], n)
-            out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
-            for i in range(n):
-                out[i] -= mobility_here[i] * ((right[i] - left[i]) * inverse[d])
+    for k in prange(shape[0]):
+        for part in range(stretches.first[k], stretches.first[k + 1]):
+            at, n = stretches.at[part], stretches.count[part]
+            for d in range(3):
+                right, left = line(correction, at, n), line(correction, at - steps[d], n)
+                out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
+                for i in range(n):
+                    out[i] -= mobility_here[i] * ((right[i] - left[i]) * inverse[d])
