@@ -133,6 +133,9 @@ class FilterKernel:
         self._sides = sides_of(self.grid.whole, self._merged.grid.whole, self.reach, self._axes)
         self._homes = self._sides.homes
         _, ny, nx = self.reach.shape
+        self._layer = (ny + 2) * (nx + 2)
+        planes = self._homes.of_layered.reshape(-1, self._layer) // (ny * nx)
+        self._lowest_homes, self._highest_homes = planes.min(axis=1), planes.max(axis=1)  # local: of a layer
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self.corners = np.array(corners, np.uint32)
 
@@ -193,9 +196,8 @@ class FilterKernel:
         if not self.unequal:
             return self.gather(stencil, smoothed[0])
         values = np.empty((len(radius), len(smoothed[0])))
-        loops.gather_of_kinds(
-            self.kinds(radius), *stencil, self.corners, self.layered(np.concatenate(smoothed)), values
-        )
+        around = self.layered(np.concatenate(smoothed), stencil)
+        loops.gather_of_kinds(self.kinds(radius), *stencil, self.corners, around, values)
         return values
 
     def sample_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, radius: Array, fields: Array) -> Array:
@@ -283,10 +285,27 @@ class FilterKernel:
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
         slabs = places or (cell_map.order, cell_map.start)
         loops.deposit(slabs, values, unit, *cell_map.stencil, self.corners, get_num_threads(), deposits)
-        fields = np.empty((values.shape[1], *shape), np.int64)
-        loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
-        collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
-        return self._merged.share(collected)
+        fields, planes = np.zeros((values.shape[1], *shape), np.int64), self._planes_below(cell_map.stencil)
+        cells = planes.start * shape[1] * shape[2], planes.stop * shape[1] * shape[2]
+        loops.collect(homes.order, homes.begins, cells, deposits, fields.reshape(len(fields), -1))
+        collected = self.reach.collected(fields)
+        if collected is not fields or np.isnan(unit).any():  # local: every rank has the same
+            planes = slice(0, len(collected[0]))
+        sums = np.zeros(collected.shape)
+        np.divide(collected[:, planes], unit[:, None, None, None], out=sums[:, planes])
+        return self._merged.share(sums)
+
+    def _layers(self, *stencils: Stencil) -> slice:
+        """The layers of cells that particles touch, among those of the grid and of the layer around it."""
+        ends = [int(end) for stencil in stencils for end in (stencil.first.min(), stencil.first.max())]  # local: own
+        return slice(min(ends) // self._layer, max(ends) // self._layer + 2)
+
+    def _planes_below(self, stencil: Stencil) -> slice:
+        """The planes of the grid with all cells that take what particles deposit."""
+        if not stencil.first.size:
+            return slice(0, 0)
+        layers = self._layers(stencil)
+        return slice(int(self._lowest_homes[layers].min()), int(self._highest_homes[layers].max()) + 1)  # local: own
 
     def _unit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Whole numbers in 1 of each of the values (m,), so many that no sum in a cell is too large; NaN for NaN."""
@@ -299,19 +318,21 @@ class FilterKernel:
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         values = np.empty((len(stencil.first), len(fields)))
-        loops.gather(*stencil, self.corners, self.layered(fields), values)
+        loops.gather(*stencil, self.corners, self.layered(fields, stencil), values)
         return values
 
     def gather_with_slope(self, stencil: Stencil, field: Array) -> Array:
         """As `gather`, of one field (nz, ny, nx), and the derivatives of this value along x, y, z (N, 4)."""
         values = np.empty((len(stencil.first), 4))
-        loops.gather_with_slope(*stencil, self.corners, self.layered(field[None]), self._axes.inverse, values)
+        around = self.layered(field[None], stencil)
+        loops.gather_with_slope(*stencil, self.corners, around, self._axes.inverse, values)
         return values
 
     def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
         """As `gather`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
         values = np.empty((len(now.first), len(fields)))
-        loops.gather_over_steps(earlier, last, now, self.corners, self.layered(fields), values)
+        around = self.layered(fields, earlier, last, now)
+        loops.gather_over_steps(earlier, last, now, self.corners, around, values)
         return values
 
     def between_centres(self, field: Array, position: Array) -> Array:
@@ -327,11 +348,18 @@ class FilterKernel:
         sample(around[None], AT_CENTRES, np.ascontiguousarray(position), origin, first, inverse, values)
         return np.asarray(values[:, 0])
 
-    def layered(self, fields: Array) -> Array:
-        """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
+    def layered(self, fields: Array, *stencils: Stencil) -> Array:
+        """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m).
+
+        stencils  of the particles that alone will read these values; of any if there are none
+        """
         layered = np.empty((len(self._homes.of_layered), len(fields)))
         around = self.reach.spread(self._merged.equalise(fields))
-        loops.spread(self._homes.of_layered, around.reshape(len(fields), -1), layered)
+        layers = slice(0, len(self._lowest_homes))
+        if stencils:
+            layers = self._layers(*stencils) if stencils[0].first.size else slice(0, 0)
+        ends = layers.start * self._layer, layers.stop * self._layer
+        loops.spread(self._homes.of_layered, ends, around.reshape(len(fields), -1), layered)
         return layered
 
     def of_deposits(self, deposits: Array) -> Array:
@@ -365,8 +393,8 @@ class FilterKernel:
         count = self.grid.shape[0]
         if self.periodic[2] or self.grid.communicator.size > 1:
             return 1, count
-        taken = np.flatnonzero(fields.any(axis=(0, 2, 3))) + 1  # local: of one process
-        return (max(int(taken[0]) - sweeps, 1), min(int(taken[-1]) + sweeps, count)) if len(taken) else (1, 0)
+        first, last = loops.ends_of(fields)
+        return (max(first + 1 - sweeps, 1), min(last + 1 + sweeps, count)) if first <= last else (1, 0)
 
     def _scratch(self, count: int) -> list[tuple[Array, Array]]:
         """Two arrays for so many padded fields, each with a view without its ghosts; the same in every call."""

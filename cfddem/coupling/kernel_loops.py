@@ -188,9 +188,9 @@ def _add(value, weights, cells, fields, m):
 
 
 @threaded
-def collect(order, begins, deposits, fields):
-    """Sums over the deposits (n, m) that each cell receives: fields (m, cells)."""
-    for cell in prange(len(begins) - 1):
+def collect(order, begins, cells, deposits, fields):
+    """Sums over the deposits (n, m) that each cell receives, from the first cell to the last: fields (m, cells)."""
+    for cell in prange(cells[0], cells[1]):
         for m in range(fields.shape[0]):
             total = 0
             for place in range(begins[cell], begins[cell + 1]):
@@ -199,9 +199,10 @@ def collect(order, begins, deposits, fields):
 
 
 @threaded
-def spread(homes, fields, layered):
-    """Values of the home of every cell: fields (m, cells) to layered (n, m); the adjoint of `collect`."""
-    for cell in prange(len(homes)):
+def spread(homes, cells, fields, layered):
+    """Values of the home of each cell, from the first to the last: fields (m, cells) to layered (n, m); the adjoint of
+    `collect`."""
+    for cell in prange(cells[0], cells[1]):
         for m in range(fields.shape[0]):
             layered[cell, m] = fields[m, homes[cell]]
 
@@ -278,6 +279,33 @@ def gather_over_steps(at_earlier, at_last, at_now, corners, fields, values):
                 _add_mean(n, quarter, old, _cells(earlier[n, s], corners), fields, values)
                 _add_mean(n, 2.0 * quarter, mid, _cells(last[n, s], corners), fields, values)
                 _add_mean(n, quarter, new, _cells(now[n, s], corners), fields, values)
+
+
+@serial
+def ends_of(fields):
+    """First and last plane of fields (m, nz, ny, nx) that are not zero everywhere; the first lies after the last if
+    all are."""
+    first, last = fields.shape[1], -1
+    for m in range(fields.shape[0]):
+        for k in range(first):
+            if _some(fields[m, k]):
+                first = k
+                break
+        for k in range(fields.shape[1] - 1, last, -1):
+            if _some(fields[m, k]):
+                last = k
+                break
+    return first, last
+
+
+@inline
+def _some(plane):
+    """Whether a value is not zero."""
+    for j in range(plane.shape[0]):
+        for i in range(plane.shape[1]):
+            if plane[j, i] != 0.0:
+                return True
+    return False
 
 
 @threaded
