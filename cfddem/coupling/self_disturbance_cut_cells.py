@@ -16,6 +16,7 @@ and of its neighbours is found with the kernel of the run, between all walls, on
 
 from __future__ import annotations
 
+import math
 from itertools import product
 
 import numpy as np
@@ -158,15 +159,20 @@ def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
     for count, periodic in zip(whole.shape, kernel.periodic[::-1]):
         number, rest = np.arange(count), count % apart if periodic else 0
         turns.append(np.where(number < count - rest, number % apart, number - count + rest + apart))
-    z, y, x = np.ix_(*turns)
-    exchanged = np.zeros((len(NEIGHBOURS), *kernel.grid.shape))
-    for c, b, a in product(*(np.unique(number) for number in turns)):
-        chosen = (z == c) & (y == b) & (x == a)
-        fields = kernel.of_deposits(kernel.grid.part(chosen).astype(float)[None])
+    (z, y, x), counts = np.ix_(*turns), [int(turn.max()) + 1 for turn in turns]  # local: every rank knows the whole box
+    turn = (z * counts[1] + y) * counts[2] + x
+    exchanged, cells = np.zeros((len(NEIGHBOURS), *kernel.grid.shape)), math.prod(kernel.grid.shape)
+    of_neighbours = np.stack([
+        kernel.grid.part(np.roll(turn, [-step for step in steps], axis=(0, 1, 2))).ravel() for steps in NEIGHBOURS
+    ]).ravel()  # fmt: skip
+    order = np.argsort(of_neighbours, kind="stable")
+    begins = np.searchsorted(of_neighbours[order], np.arange(math.prod(counts) + 1))
+    for number in np.unique(turn):
+        fields = kernel.of_deposits(kernel.grid.part(turn == number).astype(float)[None])
         for _ in range(passes if sweeps else 0):
             fields = kernel.smooth(fields, kernel.stages[kind])
-        for values, steps in zip(exchanged, NEIGHBOURS):
-            values += kernel.grid.part(np.roll(chosen, [-step for step in steps], axis=(0, 1, 2))) * fields[0]
+        here = order[begins[number] : begins[number + 1]]
+        exchanged.reshape(-1)[here] = fields.reshape(-1)[here % cells]
     return exchanged
 
 

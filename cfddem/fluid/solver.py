@@ -35,8 +35,8 @@ from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import Balance, FlowRates, Medium, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
-from cfddem.fluid.stretches import FluidStretches
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
+from cfddem.fluid.stretches import FluidStretches
 from cfddem.fluid.viscosity import EffectiveViscosity
 
 LOOSE = 1e-6

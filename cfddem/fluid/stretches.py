@@ -25,7 +25,8 @@ class Stretches(NamedTuple):
     def over(cls, wanted: Any) -> Stretches:
         """The stretches that have all wanted places of a padded field (nz, ny, nx)."""
         at, size = np.flatnonzero(wanted), wanted[0].size
-        begins = np.flatnonzero((np.diff(at, prepend=-WORTH - 1) > WORTH) | np.diff(at // size, prepend=-1).astype(bool))
+        apart, planes = np.diff(at, prepend=-WORTH - 1), np.diff(at // size, prepend=-1)
+        begins = np.flatnonzero((apart > WORTH) | (planes > 0))
         ends = np.append(begins[1:], at.size) - 1
         first = np.searchsorted(at[begins], np.arange(len(wanted) + 1) * size)
         return cls(first, at[begins], at[ends] + 1 - at[begins])

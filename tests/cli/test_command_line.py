@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import shlex
+import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr
@@ -105,6 +107,16 @@ def test_json_can_be_parsed_and_holds_the_whole_result() -> None:
     assert result["restitution"] == pytest.approx(0.5539, abs=1e-3)
     assert result["restitution_tangential"] is None
     assert result["outcome"] == "rebound"
+
+
+def test_small_products_of_matrices_take_one_thread_unless_a_user_says_so() -> None:
+    said = "import cfddem, sys; early = 'numpy' in sys.modules; import cfddem.cli, os; print(early, os.environ['{}'])"
+    name = "OPENBLAS_NUM_THREADS"
+    for chosen, expected in (({}, "1"), ({name: "2"}, "2")):
+        others = {key: value for key, value in os.environ.items() if key != name}
+        command = [sys.executable, "-c", said.format(name)]
+        told = subprocess.run(command, env=others | chosen, capture_output=True, text=True, check=True)
+        assert told.stdout.split() == ["False", expected]
 
 
 def test_a_collision_without_viscosity_is_dry() -> None:
