@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from cfddem.fluid.grid import Array
+from cfddem.fluid.grid import HIGH, LOW, Array
 
 WORTH = 40
 """So many places without fluid take as long as another stretch."""
@@ -27,7 +27,7 @@ class Stretches(NamedTuple):
         at, size = np.flatnonzero(wanted), wanted[0].size
         apart, planes = np.diff(at, prepend=-WORTH - 1), np.diff(at // size, prepend=-1)
         begins = np.flatnonzero((apart > WORTH) | (planes > 0))
-        ends = np.append(begins[1:], at.size) - 1
+        ends = np.append(begins, at.size)[1:] - 1
         first = np.searchsorted(at[begins], np.arange(len(wanted) + 1) * size)
         return cls(first, at[begins], at[ends] + 1 - at[begins])
 
@@ -46,7 +46,8 @@ class FluidStretches(NamedTuple):
         solved      1 where a face has an unknown velocity, padded (3, nz, ny, nx)
         near_walls  true where walls give convection and stress, padded (3, nz, ny, nx)
         """
-        faces = (solved > 0.0).any(axis=0)
-        whole = ((solved > 0.0) & ~near_walls).any(axis=0)
+        own, n = np.zeros(solved.shape, bool), HIGH - 1
+        own[:, LOW:-n, LOW:-n, LOW:-n] = solved[:, LOW:-n, LOW:-n, LOW:-n] > 0.0  # others are ghosts
+        faces, whole = own.any(axis=0), (own & ~near_walls).any(axis=0)  # local: three components
         beside = binary_dilation(faces, np.ones((3, 3, 3), bool))
         return cls(*(Stretches.over(wanted) for wanted in (faces, whole, beside)))

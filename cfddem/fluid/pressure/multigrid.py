@@ -72,7 +72,8 @@ class Level:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
         self.rows = np.zeros((2, *self.shape[::2]))  # of each plane two
-        self.wet = np.ones(self.shape[:2], bool)  # rows with unknowns; all values of the others stay zero
+        # first row of each plane that has unknowns, and the one after the last; all values beyond them stay zero
+        self.wet = np.zeros((self.shape[0], 2), np.int64)
         self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
         self.small = self.x.size < SMALL
 

@@ -56,20 +56,31 @@ def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
 
 @threaded
 def take_diagonal(ax, ay, az, anchor, diagonal, inverse, wet):
-    """Diagonal of L and its inverse, zero in solid cells; and whether a row (nz, ny) has other ones."""
+    """Diagonal of L and its inverse, zero in solid cells; and of each plane the first row that has other ones, and the
+    one after the last (nz, 2)."""
     nz, ny, nx = ax.shape
     for k in prange(nz):
         above = neighbours(k, nz)[1]
+        wet[k, 0], wet[k, 1] = ny, 0
         for j in range(ny):
-            back, largest = neighbours(j, ny)[1], 0.0
+            back = neighbours(j, ny)[1]
             for i in range(nx):
                 right = neighbours(i, nx)[1]
                 total = ax[k, j, i] + ay[k, j, i] + az[k, j, i] + anchor[k, j, i]
                 total = total + ax[k, j, right] + ay[k, back, i] + az[above, j, i]
                 diagonal[k, j, i] = total
                 inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
-                largest = max(largest, total)
-            wet[k, j] = largest > 0.0
+            if _is_wet(diagonal[k, j]):
+                wet[k, 0], wet[k, 1] = min(wet[k, 0], j), j + 1
+
+
+@inline
+def _is_wet(diagonal):
+    """Whether a row has cells that are not solid."""
+    for i in range(diagonal.size):
+        if diagonal[i] > 0.0:
+            return True
+    return False
 
 
 @vector_inline
@@ -79,11 +90,9 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
     nz, ny, nx = x.shape
     below, above = neighbours(k, nz)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
-    last, _ = neighbours(0, ny)
-    for count in range(ny):
-        j = (last if count == 0 else count - 1) if backward else count
-        if not wet[k, j]:
-            continue
+    begin, end = wet[k, 0], wet[k, 1]
+    for count in range(begin, end):
+        j = (end - 1 if count == begin else count - 1) if backward else count
         front, back = neighbours(j, ny)
         here, west, rhs, invert = x[k, j], ax[k, j], b[k, j], inverse[k, j]
         south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
@@ -107,7 +116,7 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
 def smooth(x, b, matrix, rows, first, halves, backward):
     """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten.
 
-    matrix  coefficients along x, y, z, the inverse of the diagonal, and which rows are wet
+    matrix  coefficients along x, y, z, the inverse of the diagonal, and the wet rows
     first   colour of the first half of a sweep
     halves  number of halves, of both colours in turn
     """
@@ -147,10 +156,9 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
 def residual(x, b, ax, ay, az, diagonal, wet, left):
     """left = b - L x in the wet rows."""
     for k in prange(x.shape[0]):
-        for j in range(x.shape[1]):
-            if wet[k, j]:
-                _apply_row(k, j, x, ax, ay, az, diagonal, left[k, j])
-                _subtract_from(b[k, j], left[k, j])
+        for j in range(wet[k, 0], wet[k, 1]):
+            _apply_row(k, j, x, ax, ay, az, diagonal, left[k, j])
+            _subtract_from(b[k, j], left[k, j])
 
 
 @vector_inline
@@ -171,7 +179,7 @@ def _add(values, row):
 def restrict(values, wet, factors, shift, rows, coarse):
     """Sum the values of a level over the cells that make one coarse cell; rows are overwritten.
 
-    wet    rows that have values
+    wet    rows that have values, as `take_diagonal` finds them
     shift  along x, y, z; cell k lies in the coarse cell (k + shift) // factor
     """
     nz, ny, nx = values.shape
@@ -182,9 +190,8 @@ def restrict(values, wet, factors, shift, rows, coarse):
             first_row, end_row = _cells_in(jc, factors[1], shift[1], ny)
             total[:] = 0.0
             for k in range(first_plane, end_plane):
-                for j in range(first_row, end_row):
-                    if wet[k, j]:
-                        _add(values[k, j], total)
+                for j in range(max(first_row, wet[k, 0]), min(end_row, wet[k, 1])):
+                    _add(values[k, j], total)
             for ic in range(coarse.shape[2]):
                 first, end = _cells_in(ic, factors[0], shift[0], nx)
                 coarse[kc, jc, ic] = 0.0
@@ -204,18 +211,16 @@ def prolong(coarse_x, wet, factors, shift, rows, x):
             for i in range(nx):
                 correction[i] = coarse_x[kc, jc, (i + shift[0]) // factors[0]]
             for k in range(first_plane, end_plane):
-                for j in range(first_row, end_row):
-                    if wet[k, j]:
-                        _add(correction, x[k, j])
+                for j in range(max(first_row, wet[k, 0]), min(end_row, wet[k, 1])):
+                    _add(correction, x[k, j])
 
 
 @threaded
 def apply(x, ax, ay, az, diagonal, wet, out):
     """out = L x in the wet rows."""
     for k in prange(x.shape[0]):
-        for j in range(x.shape[1]):
-            if wet[k, j]:
-                _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
+        for j in range(wet[k, 0], wet[k, 1]):
+            _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
 
 
 @threaded
@@ -223,9 +228,7 @@ def descend(length, direction, image, wet, x, residual, largest):
     """x += length direction, residual -= length image; largest[k] is the largest residual in plane k."""
     for k in prange(x.shape[0]):
         most = 0.0
-        for j in range(x.shape[1]):
-            if not wet[k, j]:
-                continue
+        for j in range(wet[k, 0], wet[k, 1]):
             for i in range(x.shape[2]):
                 x[k, j, i] += length * direction[k, j, i]
                 left = residual[k, j, i] - length * image[k, j, i]
@@ -239,9 +242,8 @@ def largest_products(a, b, wet, rows, largest):
     """Largest magnitude of a b in each plane of two cell fields (nz, ny, nx); rows (2, nz, nx) are overwritten."""
     for k in prange(a.shape[0]):
         rows[0, k] = 0.0
-        for j in range(a.shape[1]):
-            if wet[k, j]:
-                _take_largest(a[k, j], b[k, j], rows[0, k])
+        for j in range(wet[k, 0], wet[k, 1]):
+            _take_largest(a[k, j], b[k, j], rows[0, k])
         most = 0.0
         for i in range(a.shape[2]):
             most = max(most, rows[0, k, i])
@@ -253,9 +255,8 @@ def split_products(a, b, wet, unit, rows, parts):
     """Sums of the two whole numbers of a b in each plane of two cell fields, and how many are not finite (nz, 3)."""
     for k in prange(a.shape[0]):
         rows[0, k] = rows[1, k] = 0.0
-        for j in range(a.shape[1]):
-            if wet[k, j]:
-                _add_split(a[k, j], b[k, j], unit, rows[0, k], rows[1, k])
+        for j in range(wet[k, 0], wet[k, 1]):
+            _add_split(a[k, j], b[k, j], unit, rows[0, k], rows[1, k])
         parts[k] = 0
         for i in range(a.shape[2]):  # sums over a row of the plane are below 2^53
             if abs(rows[0, k, i]) < math.inf:
