@@ -153,9 +153,10 @@ def transport(stretches, velocity, voidage, viscosity, buried, medium, flux, exp
     velocity, flux = velocity.reshape(3, -1), flux.reshape(3, -1)
     buried, rate = buried.reshape(3, -1), rate.reshape(3, -1)
     moving = velocity, flux, viscosity, buried
+    first, begins, counts = stretches.around  # the compiler cannot give tuples of arrays to threads
     for k in prange(shape[0]):
-        for part in range(stretches.around.first[k], stretches.around.first[k + 1]):
-            at, n = stretches.around.at[part], stretches.around.count[part]
+        for part in range(first[k], first[k + 1]):
+            at, n = begins[part], counts[part]
             for d in range(3):
                 here, before = line(voidage, at, n), line(voidage, at - step[d], n)
                 out, u = line(flux[d], at, n), line(velocity[d], at, n)
@@ -168,9 +169,10 @@ def transport(stretches, velocity, voidage, viscosity, buried, medium, flux, exp
             for i in range(n):
                 growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
                 out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
+    first_whole, begins_whole, counts_whole = stretches.whole
     for k in prange(shape[0]):
-        for part in range(stretches.whole.first[k], stretches.whole.first[k + 1]):
-            at, n = stretches.whole.at[part], stretches.whole.count[part]
+        for part in range(first_whole[k], first_whole[k + 1]):
+            at, n = begins_whole[part], counts_whole[part]
             for d in range(3):
                 out, right, left = line(rate[d], at, n), line(expansion, at, n), line(expansion, at - step[d], n)
                 for i in range(n):
@@ -242,9 +244,10 @@ def predict(stretches, balance, medium, step, weight_b, new, mobility):
     rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
     old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
     times, cells = (step, weight_b), (voidage, centred, stored, drag, pressure)
+    first, begins, counts = stretches
     for k in prange(shape[0]):
-        for part in range(stretches.first[k], stretches.first[k + 1]):
-            at, n = stretches.at[part], stretches.count[part]
+        for part in range(first[k], first[k + 1]):
+            at, n = begins[part], counts[part]
             for d in range(3):
                 place = at, at - steps[d], d
                 out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)

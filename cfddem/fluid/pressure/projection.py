@@ -223,9 +223,10 @@ def subtract_gradient(stretches, new, mobility, correction, inverse):
     """Subtract mobility times the gradient of the pressure correction from the velocity, on stretches of faces."""
     shape, steps = correction.shape, strides(correction.shape)
     new, mobility, correction = new.reshape(3, -1), mobility.reshape(3, -1), correction.reshape(-1)
+    first, begins, counts = stretches
     for k in prange(shape[0]):
-        for part in range(stretches.first[k], stretches.first[k + 1]):
-            at, n = stretches.at[part], stretches.count[part]
+        for part in range(first[k], first[k + 1]):
+            at, n = begins[part], counts[part]
             for d in range(3):
                 right, left = line(correction, at, n), line(correction, at - steps[d], n)
                 out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
