@@ -138,16 +138,16 @@ class Balance(NamedTuple):
 
 
 @threaded
-def transport(stretches, velocity, voidage, viscosity, buried, medium, flux, expansion, rate):
+def transport(stretches, velocity, cells, buried, medium, flux, expansion, rate):
     """rate = div(eps tau) - div(rho eps u u) on faces away from smooth walls; also writes flux and expansion.
 
     stretches  `FluidStretches`
 
-    velocity, flux (eps u), rate (3, ...); voidage, viscosity (eps mu [Pa s]), expansion (2/3 eps mu div u)
-    padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half
-    way; medium `Medium`.
+    velocity, flux (eps u), rate (3, ...); cells, which are voidage and viscosity (eps mu [Pa s]), and expansion
+    (2/3 eps mu div u) padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a
+    no-slip wall half way; medium `Medium`.
     """
-    inverse = medium.inverse
+    inverse, (voidage, viscosity) = medium.inverse, cells
     shape, step = voidage.shape, strides(voidage.shape)
     voidage, viscosity, expansion = voidage.reshape(-1), viscosity.reshape(-1), expansion.reshape(-1)
     velocity, flux = velocity.reshape(3, -1), flux.reshape(3, -1)
@@ -232,7 +232,7 @@ def _balance(out, moving, at, step, medium, along, across):
 def predict(stretches, balance, medium, step, weight_b, new, mobility):
     """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
 
-    stretches      of faces with an unknown velocity
+    stretches      `FluidStretches`
     weight_b       of the second of both forces
     new, mobility  (3, ...) [m/s] and [m2 s/kg]
     """
@@ -244,7 +244,7 @@ def predict(stretches, balance, medium, step, weight_b, new, mobility):
     rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
     old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
     times, cells = (step, weight_b), (voidage, centred, stored, drag, pressure)
-    first, begins, counts = stretches
+    first, begins, counts = stretches.solved
     for k in prange(shape[0]):
         for part in range(first[k], first[k + 1]):
             at, n = begins[part], counts[part]

@@ -228,7 +228,7 @@ class FluidSolver:
         fields = self.fields
         self._effective.update(velocity, voidage, fields.viscosity, fields.effective_viscosity)
         transport(
-            self._stretches, velocity, voidage, fields.effective_viscosity, self.faces.buried, medium, fields.flux,
+            self._stretches, velocity, (voidage, fields.effective_viscosity), self.faces.buried, medium, fields.flux,
             fields.expansion, force,
         )  # fmt: skip
         self.walls.replace(velocity, fields.effective_viscosity, medium.density, medium.central, force)
@@ -240,8 +240,8 @@ class FluidSolver:
     def _predict(self, new: Array, step: float, weight: float) -> None:
         """Write the velocity after the step with the pressure as it is; the second explicit force has this weight."""
         self.boundaries.fill_pressure(self.fields.pressure)
-        stretches = self._stretches.solved
-        predict(stretches, self._balance(self.fields.velocity), self._medium, step, weight, new, self.fields.mobility)
+        old, mobility = self.fields.velocity, self.fields.mobility
+        predict(self._stretches, self._balance(old), self._medium, step, weight, new, mobility)
         self.walls.hold(new, self.density, self.model_b, step, weight)
         self.boundaries.set_faces(new)
 
@@ -394,8 +394,8 @@ class FluidSolver:
     @property
     def mean_velocity(self) -> Array:
         """Mean of the velocities before and after the last step at cell centres (nz, ny, nx, 3) [m/s]."""
-        mean = 0.5 * (self.fields.other_velocity + self.fields.velocity)
-        return np.moveaxis(self._in_cells(mean, self._every_face), 0, -1)
+        other, now = self.fields.other_velocity, self.fields.velocity
+        return np.moveaxis(self._in_cells(0.5 * (other + now), self._every_face), 0, -1)
 
     @property
     def voidage(self) -> Array:
@@ -451,8 +451,7 @@ class FluidSolver:
         """Go on from a `checkpoint()` of a fluid with the same grid and boundaries, on any number of ranks; gives the
         same bits on the same number of ranks."""
         self.fields.restore(stored)
-        self.time = float(stored["time"])
-        fields, halo = self.fields, self.boundaries.halo
+        self.time, fields, halo = float(stored["time"]), self.fields, self.boundaries.halo
         for cells in (fields.mean_voidage, fields.viscosity):
             halo.fill(cells)
         self.boundaries.fill_pressure(fields.pressure)
@@ -480,8 +479,7 @@ class FluidSolver:
         returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
                  the implicit drag has seen [m/s]
         """
-        fields = self.fields
-        weight, mean = np.empty((2, *fields.velocity.shape))
+        fields, (weight, mean) = self.fields, np.empty((2, *self.fields.velocity.shape))
         drag_seen(self._balance(fields.other_velocity), fields.velocity, self._medium, self.last_step, weight, mean)
         return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(mean), 0, -1)
 
@@ -496,8 +494,7 @@ class FluidSolver:
 
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:
         """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
-        force = np.zeros_like(velocity)
-        still = self._medium._replace(density=0.0, central=0.0)  # no convection is left
+        force, still = np.zeros_like(velocity), self._medium._replace(density=0.0, central=0.0)  # without convection
         self._find_explicit_force(velocity, voidage, force, still)
         return force
 
