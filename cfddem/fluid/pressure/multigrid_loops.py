@@ -70,17 +70,10 @@ def take_diagonal(ax, ay, az, anchor, diagonal, inverse, wet):
                 total = total + ax[k, j, right] + ay[k, back, i] + az[above, j, i]
                 diagonal[k, j, i] = total
                 inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
-            if _is_wet(diagonal[k, j]):
-                wet[k, 0], wet[k, 1] = min(wet[k, 0], j), j + 1
-
-
-@inline
-def _is_wet(diagonal):
-    """Whether a row has cells that are not solid."""
-    for i in range(diagonal.size):
-        if diagonal[i] > 0.0:
-            return True
-    return False
+            for i in range(nx):
+                if diagonal[k, j, i] > 0.0:
+                    wet[k, 0], wet[k, 1] = min(wet[k, 0], j), j + 1
+                    break
 
 
 @vector_inline
