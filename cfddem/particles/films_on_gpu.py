@@ -16,7 +16,6 @@ from cfddem.particles.interactions.joint_films import enter, is_due, leave
 from cfddem.particles.interactions.joint_solution import (
     MOST_ITERATIONS,
     PASSES,
-    SETTLED,
     best_factor,
     film_direction,
     film_follows,
@@ -26,6 +25,7 @@ from cfddem.particles.interactions.joint_solution import (
     scale_film,
     scale_of,
     scale_particle,
+    settled,
     take_impulses,
     whole_units,
 )
@@ -70,7 +70,7 @@ def solve_films(system, step, threads):
             grid.sync()
             left, whole, by_wanted, by_residual = _residual(False, count, system, step, threads)
         limit = tolerance * tolerance * whole
-        if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
+        if settled(left, whole, limit, passes):
             break
         passes += 1
         share, outdated = 0.0, 0.0

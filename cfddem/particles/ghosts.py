@@ -28,7 +28,6 @@ from cfddem.particles.interactions.bridge_changes import share_wall_liquid
 from cfddem.particles.interactions.joint_solution import (
     MOST_ITERATIONS,
     PASSES,
-    SETTLED,
     along_direction,
     begin_solution,
     best_factor,
@@ -38,6 +37,7 @@ from cfddem.particles.interactions.joint_solution import (
     new_residual,
     new_scale,
     scale_of,
+    settled,
     start_films,
     units_of,
 )
@@ -396,7 +396,7 @@ class FilmsWithGhosts:
                 largest = self.new_residual(system, count, step, False)
             left, whole = (self._total(system, count, number, column, largest) for column in (0, 1))
             limit = tolerance * tolerance * whole
-            if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
+            if settled.py_func(left, whole, limit, passes):
                 break
             passes += 1
             share, tops = 0.0, (0.0, 0.0)

@@ -185,7 +185,7 @@ class StepsOnGpu:
         refused += ["an energy account"] * energies + [f"{ranks} ranks"] * (ranks > 1)
         if refused:
             remedy = "leave them out, or take gpu = false"
-            raise InputError("gpu", " and ".join(refused), "a run of contacts and films", remedy)
+            raise InputError("gpu", " and ".join(refused), "a run of contacts, and films that act by impulses", remedy)
         name_of_gpu()  # refuses where there is none
         self._steps, self._arrays = for_gpu(_steps, choices), DeviceArrays()
         self._moved_far, self._done = np.zeros(STEPS, np.uint8), np.zeros(1, np.int64)

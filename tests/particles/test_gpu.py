@@ -58,6 +58,9 @@ assert len(run.edges.first) > run.edges.between_particles > 50
 gone = run.remove(run.particles.id == 20)
 run.insert(make_particles(gone.position, 0.5e-3, 2500.0, velocity=(0.0, 0.0, -0.3),
                           viscosity=0.0 if films == "dry" else 0.1))
+if films != "dry":  # impulses of the last step would add energy now
+    run.particles.velocity[:] *= -1.0
+    run.particles.spin[:] *= -1.0
 made = run.lists.made
 run.advance(1e-6, 5 if films == "dry" else 2)
 assert run.lists.made > made
@@ -91,7 +94,8 @@ def test_steps_on_a_gpu_agree_with_those_on_the_processor(
 ) -> None:
     """48 spheres, one of them fixed, a sliding plane and a turning cylinder, outside force, new lists, an insert.
 
-    Dry they have the same bits. Films take logarithms, whose last digits differ; 290 are solved together in 7 steps.
+    Dry they have the same bits. Films take logarithms, whose last digits differ; 288 are solved in 7 steps, 41 at a
+    time. In one of them the impulses of the last step would add energy.
     """
     if where == "gpu":
         try:
@@ -110,7 +114,7 @@ def test_steps_on_a_gpu_agree_with_those_on_the_processor(
         assert done.returncode == 0, done.stderr[-2000:]
         with np.load(path) as arrays:
             states.append({name: arrays[name] for name in arrays.files})
-    assert films == "dry" or states[0]["film_counts"][3] == 290
+    assert films == "dry" or states[0]["film_counts"][3] == 288
     for name, values in states[0].items():
         error = 0.0 if films == "dry" or name in ("film_counts", "lists") else 1e-12 * np.abs(values).max()
         np.testing.assert_allclose(states[1][name], values, rtol=0.0, atol=error, err_msg=name)
@@ -134,7 +138,7 @@ WATER = BridgeLaws(viscosity=1e-3, surface_tension=0.072)
 )
 def test_what_a_gpu_does_not_have_is_refused(others: dict, words: str) -> None:
     settings = {"settings": SolverSettings(gpu=True), **others}
-    with pytest.raises(InputError, match=f"gpu = '{words}': must be a run of contacts and films"):
+    with pytest.raises(InputError, match=f"gpu = '{words}': must be a run of contacts, and films that act by impulses"):
         ParticleSolver(make_particles([[0.0, 0.0, 1e-3]], 1e-3, 2500.0), pair_table([GLASS]), **settings)
 
 
@@ -150,6 +154,8 @@ run = {until = 0.001, gpu = true}
 
 @pytest.mark.parametrize("key, value", [("run.energy_budget", True), ("run.record_collisions", True)])
 def test_a_check_names_the_keys_that_a_gpu_does_not_know(key: str, value: Any) -> None:
+    films = DRY.with_(**{"fluid.density": 998.0, "fluid.viscosity": 1e-3, "laws.lubrication": "nijssen"})
+    assert films.has_films and not [issue for issue in preflight(films).issues if issue.key == "run.gpu"]
     assert not [issue for issue in preflight(DRY).issues if issue.key == "run.gpu"]
     (issue,) = [issue for issue in preflight(DRY.with_(**{key: value})).issues if issue.key == "run.gpu"]
     assert issue.severity == "error" and key in issue.reason

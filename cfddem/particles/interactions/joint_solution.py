@@ -60,6 +60,9 @@ SETTLED = 1e-14
 """Square of the first residual over that without impulses below which the impulses of the last step stay. It is small
 because what a step leaves is left in the same direction by the next: a pair that slows down would stop too late."""
 
+RENEWED = 4.0
+"""Square of the residual with resistances found anew, over that of the tolerance, below which no pass is needed."""
+
 LOST = 1e-9
 """Part of one sum of two below which their difference is lost in rounding."""
 
@@ -92,6 +95,17 @@ def best_factor(by_wanted, by_residual):
     """
     square = by_wanted - by_residual
     return by_wanted / square if square > LOST * abs(by_wanted) else 0.0
+
+
+@inline
+def settled(left, whole, limit, passes):
+    """Whether impulses need no iterations with the resistances as they are.
+
+    left, whole  squares of the residual, and of that without impulses
+    limit        square of the tolerance times `whole`
+    passes       made so far
+    """
+    return not left > (RENEWED * limit if passes > 0 else min(limit, SETTLED * whole))
 
 
 @part
@@ -209,7 +223,7 @@ def film_kick(system, step):
             largest = new_residual(system, count, step, False)
         left, whole = total_of(system, count, 0, largest[0]), total_of(system, count, 1, largest[1])
         limit = tolerance * tolerance * whole
-        if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
+        if settled(left, whole, limit, passes):
             break
         passes += 1
         share, top = 0.0, (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""`cfddem validate drying`: fluidised beds that dry, and wet ones that stand still until they are dry."""
+"""`cfddem validate drying`: fluidised beds that dry, and wet ones that are one piece until they are dry."""
 
 from __future__ import annotations
 
@@ -81,14 +81,15 @@ def history(case: Case, every: float = 0.02) -> dict[str, np.ndarray]:
 
 
 def stuck(curves: Curves) -> list[Row]:
-    """A wet bed that stands still: it fluidises again when it is dry, and does not with solid bonds."""
+    """A wet bed that is one piece: it fluidises again when it is dry, and does not with solid bonds."""
     rows, dry, by_name = [], {}, {}
     joined = {"without bonds": (0.0, 0.033), "with bonds": (1.0, 0.07)}  # expected, and limit
     for name in joined:
         by_name[name] = columns = history(sticky_case(bonds=name == "with bonds"))
         units = {"time": "s", "granular_temperature": "m2/s2", "liquid_in_bridges": "m3", "largest_agglomerate": "-"}
         curves[f"dried bed, {name}"] = {column: (columns[column], unit) for column, unit in units.items()}
-        still, end = ((columns["time"] > begin) & (columns["time"] <= last) for begin, last in (STILL, DRY))
+        time = columns["time"]
+        still, end = ((time > begin + 1e-9) & (time < last + 1e-9) for begin, last in (STILL, DRY))
         motion, largest = columns["granular_temperature"], columns["largest_agglomerate"] / COUNT
         dry[name] = float(motion[end].mean())
         rows += [
