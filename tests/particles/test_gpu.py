@@ -154,7 +154,7 @@ run = {until = 0.001, gpu = true}
 
 @pytest.mark.parametrize("key, value", [("run.energy_budget", True), ("run.record_collisions", True)])
 def test_a_check_names_the_keys_that_a_gpu_does_not_know(key: str, value: Any) -> None:
-    films = DRY.with_(**{"fluid.density": 998.0, "fluid.viscosity": 1e-3, "laws.lubrication": "nijssen"})
+    films = DRY.with_(**{"fluid": {"density": 998.0, "viscosity": 1e-3}, "laws.lubrication": "nijssen"})
     assert films.has_films and not [issue for issue in preflight(films).issues if issue.key == "run.gpu"]
     assert not [issue for issue in preflight(DRY).issues if issue.key == "run.gpu"]
     (issue,) = [issue for issue in preflight(DRY.with_(**{key: value})).issues if issue.key == "run.gpu"]
