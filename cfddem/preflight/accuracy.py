@@ -1,8 +1,8 @@
 """What cells, kernel and fluid step cost in accuracy, as far as it was measured in beds of the validation.
 
-`LIQUID` has rows of `docs/tables` (`cfddem validate bed-steps`, `cfddem validate beds`), and `GAS` those of
-`cfddem validate gas-bed-steps`. The other numbers are those of pages; no command computes them again, except those of a
-lattice. Another bed may differ from all of these.
+`LIQUID` and `GAS` have rows of `docs/tables` (`cfddem validate bed-steps`, `beds` and `gas-bed-steps`). The other
+numbers are those of pages; no command computes them again, except those of a lattice. Another bed may differ from all
+of these.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Change(NamedTuple):
     name: str
     value: float
     error: float  # standard error
-    table: str  # of `docs/tables`; "limits" is the one of gas beds in `docs/limits.md`
-    row: str  # that it is read from; in the limits with its column
+    table: str  # of `docs/tables`
+    row: str  # that it is read from: a ratio, or a value with its reference
     bed: str
     surface: str = "smeared"
 
@@ -62,15 +62,15 @@ LIQUID = (
 
 SMALL = ("small gas bed", "sharp")
 QUARTER, FINER = "0.125 ms, 2.40 d, 1.2 s: {}", "0.5 ms, 1.71 d, 2.2 s: {}"
-HEIGHT, DROP, DEVIATION = "mean height [mm]", "pressure drop over weight", "its deviation in time"
+HEIGHT, DROP, DEVIATION = "mean height", "pressure drop over weight", "its deviation in time"
 
 GAS = (
-    Change("quarter of fluid step: bed height", 1.001, 0.0082, "limits", QUARTER.format(HEIGHT), *SMALL),
-    Change("the same: pressure drop", 0.998, 0.0038, "limits", QUARTER.format(DROP), *SMALL),
-    Change("the same: its deviation in time", 1.004, 0.018, "limits", QUARTER.format(DEVIATION), *SMALL),
-    Change("cells finer by 1.4: bed height", 0.964, 0.0043, "limits", FINER.format(HEIGHT), *SMALL),
-    Change("the same: pressure drop", 1.025, 0.0068, "limits", FINER.format(DROP), *SMALL),
-    Change("the same: its deviation in time", 0.861, 0.02, "limits", FINER.format(DEVIATION), *SMALL),
+    Change("quarter of fluid step: bed height", 1.001, 0.0082, "gas-bed-steps", QUARTER.format(HEIGHT), *SMALL),
+    Change("the same: pressure drop", 0.998, 0.0038, "gas-bed-steps", QUARTER.format(DROP), *SMALL),
+    Change("the same: its deviation in time", 1.004, 0.018, "gas-bed-steps", QUARTER.format(DEVIATION), *SMALL),
+    Change("cells finer by 1.4: bed height", 0.964, 0.0043, "gas-bed-steps", FINER.format(HEIGHT), *SMALL),
+    Change("the same: pressure drop", 1.025, 0.0068, "gas-bed-steps", FINER.format(DROP), *SMALL),
+    Change("the same: its deviation in time", 0.861, 0.02, "gas-bed-steps", FINER.format(DEVIATION), *SMALL),
 )
 """Beds in a gas: one of 2 000 seeds of the case `gas-bed`, 12 diameters high."""
 

@@ -13,10 +13,12 @@ from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.fluid.cell_counts import cell_counts, suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate, share_of_jet
+from cfddem.preflight.collision_estimate import wall_material
 from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
 from cfddem.preflight.issue import Issue, percent, plain
 from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.wall_checks import MOST_CELLS
+from closures.minimum_gap import asperities
 from closures.wall_drag import CLOSEST, along_wall, towards_wall
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
@@ -222,19 +224,22 @@ def check_wall_drag(case: Case, steps: StepEstimate) -> Iterator[Issue]:
 
 
 def _check_step_beside_walls(case: Case, steps: StepEstimate) -> Iterator[Issue]:
-    """Check that no sphere begins to oscillate beside a wall."""
+    """Check that no sphere begins to oscillate beside a wall, at gaps beyond those of its asperities."""
     fluid, carried = case.around, case.laws.added_mass_at(1.0) * case.around.density
-    rates = [
-        4.5 * fluid.viscosity / ((0.5 * species.smallest_diameter) ** 2 * (case.material_of(species).density + carried))
-        for species in case.species.values()
-    ]
-    step = steps.fluid * max(rates)
-    if growth_beside_wall(CLOSEST, step) > 0.0:
-        gap = brentq(growth_beside_wall, CLOSEST, FARTHEST, args=(step,))
+    gaps: dict[str, float] = {}
+    for name, species in case.species.items():
+        solid, radius = case.material_of(species), 0.5 * species.smallest_diameter
+        step = steps.fluid * 4.5 * fluid.viscosity / (radius**2 * (solid.density + carried))
+        least = max(asperities(solid.roughness, wall_material(case, solid).roughness) / radius, CLOSEST)
+        if growth_beside_wall(least, step) > 0.0:
+            gaps[name] = brentq(growth_beside_wall, least, FARTHEST, args=(step,))
+    if gaps:
+        name, gap = max(gaps.items(), key=lambda each: each[1])
+        whose = f" of {name}" if len(case.species) > 1 else ""
         yield Issue(
             "warning", "laws.wall_drag",
             f"without films a sphere that moves along a wall oscillates across it in fluid steps of {steps.fluid:.2g} "
-            f"s where the gap is below {gap:.2g} radii",
+            f"s where the gap is below {gap:.2g} radii{whose}",
             'set laws.lubrication = "nijssen", or a smaller run.fluid_step for a smaller gap',
         )  # fmt: skip
 

@@ -73,31 +73,19 @@ def test_a_run_has_the_surfaces_of_its_case(surface: str, sharp: bool) -> None:
     assert any(force.sharp for force in forces) == sharp
 
 
-@pytest.mark.parametrize("change", LIQUID, ids=lambda each: each.row)
+@pytest.mark.parametrize("change", LIQUID + GAS, ids=lambda each: each.row)
 def test_changes_are_those_of_the_stored_tables(change: accuracy.Change) -> None:
+    """Value of a row over its reference, which is 1 for a row that is a ratio, with the error of both."""
     rows = {each["quantity"]: each for each in json.loads((TABLES / f"{change.table}.json").read_text())["rows"]}
-    value = rows[change.row]["value"]
-    error = float(re.findall(r"standard error (?:of the paired difference )?(\S+)", rows[change.row]["note"])[0])
+    row = rows[change.row]
+    ((own, other),) = re.findall(
+        r"error (?:of the paired difference )?([\d.e-]+)(?:, of the reference ([\d.e-]+))?", row["note"]
+    )
+    value = row["value"] / row["reference"]
+    error = value * math.hypot(float(own) / row["value"], float(other or 0.0) / row["reference"])
     inverse = "over a tenth" in change.row  # the table has the coarse step over the fine one
     assert change.value == pytest.approx(1.0 / value if inverse else value, abs=6e-4)
     assert change.error == pytest.approx(error / value**2 if inverse else error, abs=6e-4)
-
-
-@pytest.mark.parametrize("change", GAS, ids=lambda each: each.row)
-def test_changes_of_gas_beds_are_those_of_the_limits(change: accuracy.Change) -> None:
-    """Ratio of a row of the table to that of the bed as it is to the same time, with the error of both."""
-    heading, *lines = re.findall(
-        r"(?m)^ +\| (?:fluid step, cells, end|[\d.]+ ms, [\d.]+ d, [\d.]+ s) \|.*$",
-        (ROOT / "docs" / "limits.md").read_text(),
-    )
-    label, column = change.row.split(": ")
-    place = [each.strip() for each in heading.split("|")].index(column)
-    usual = f"0.5 ms, 2.40 d, {label.split(', ')[2]}"
-    table = {cells[1].strip(): cells[place].split("±") for cells in (line.split("|") for line in lines)}
-    (value, error), (base, other) = ([float(each) for each in table[row]] for row in (label, usual))
-    assert change.table == "limits" and change.surface == "sharp"
-    assert change.value == pytest.approx(value / base, abs=6e-4)
-    assert change.error == pytest.approx(value / base * math.hypot(error / value, other / base), abs=6e-4)
 
 
 def test_the_check_says_what_cells_and_kernel_cost() -> None:

@@ -7,8 +7,9 @@ Every flat or round face is a wall: a capped cylinder has three. The sum over wa
 is added to the drag of the drag law: creeping flow near the wall, which is too much far from it.
 
 The transfer of momentum is implicit with one number per particle. This is the conductance along the slip; the
-remainder, which turns the slip, is explicit. With the drag, the conductance is at least half of that in any direction,
-so that any step is stable.
+remainder, which turns the slip, is explicit. With the drag, the conductance is at least half of that in any direction.
+Long fluid steps still let motion across a wall grow (:func:`~cfddem.preflight.flow_checks.growth_beside_wall`);
+`cfddem check` warns.
 """
 
 from __future__ import annotations

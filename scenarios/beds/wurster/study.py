@@ -168,7 +168,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
     curve.set_title("pellets in a second, thousands", fontsize=9.5)
     legend(curve, loc="upper right")
     carried = coating(run, case).liquid * CUBIC_MILLIMETRES
-    histogram.hist(carried[carried > 0.0], bins=np.linspace(0.0, 2.0 * MOST, 25), color=BLUE)
+    histogram.hist(carried[carried > 0.0], bins=np.linspace(0.0, max(2.0 * MOST, float(carried.max())), 25), color=BLUE)
     histogram.set(xlabel="on a pellet  [mm3]", yscale="log")
     histogram.set_title("wet pellets, at the end", fontsize=9.5)
     save(drawn, path)
