@@ -234,12 +234,12 @@ def _check_step_beside_walls(case: Case, steps: StepEstimate) -> Iterator[Issue]
         if growth_beside_wall(least, step) > 0.0:
             gaps[name] = brentq(growth_beside_wall, least, FARTHEST, args=(step,))
     if gaps:
-        name, gap = max(gaps.items(), key=lambda each: each[1])
+        name = max(gaps, key=gaps.__getitem__)
         whose = f" of {name}" if len(case.species) > 1 else ""
         yield Issue(
             "warning", "laws.wall_drag",
             f"without films a sphere that moves along a wall oscillates across it in fluid steps of {steps.fluid:.2g} "
-            f"s where the gap is below {gap:.2g} radii{whose}",
+            f"s where the gap is below {gaps[name]:.2g} radii{whose}",
             'set laws.lubrication = "nijssen", or a smaller run.fluid_step for a smaller gap',
         )  # fmt: skip
 

@@ -108,6 +108,22 @@ def test_steps_in_which_a_sphere_oscillates_beside_a_wall_are_warned_of(modulus:
         assert "laws.wall_drag" not in {each.key for each in preflight(case.with_(**changes)).issues}
 
 
+@pytest.mark.parametrize(
+    ("glass", "graphite", "gap"),
+    [(0.0, 0.0, ["0.004 radii of beads"]), (2.1e-6, 0.0, ["0.00086 radii of pellets"]), (2.1e-6, 1.2e-6, [])],
+)
+def test_a_gap_to_a_wall_is_that_of_a_species_and_above_its_asperities(
+    glass: float, graphite: float, gap: list[str]
+) -> None:
+    """0.004 radii of beads of 1 mm are 2.0 um, 0.00086 of pellets of 2.5 mm 1.1 um."""
+    case = GALLERY["segregation"].with_(**{
+        "column.sides": "no_slip", "laws.wall_drag": "nearest", "laws.lubrication": "none",
+        "material.glass.roughness": glass, "material.graphite.roughness": graphite,
+    })  # fmt: skip
+    reasons = [each.reason for each in preflight(case).issues if each.key == "laws.wall_drag"]
+    assert [each.split("below ")[1] for each in reasons] == gap
+
+
 def test_drag_beside_solid_cells_that_the_grid_counts_again_is_warned_of() -> None:
     """Beside flat sides of the box and smooth walls it is taken out."""
     walls = {"column.sides": "no_slip", "laws.wall_drag": "nearest", "laws.lubrication": "nijssen"}
