@@ -11,9 +11,6 @@ import math
 
 from closures.registry import law
 
-CLOSEST = 1e-4
-"""Gap over the radius, at least; what grows further is in the films."""
-
 SHEAR = 8.0 / 15.0
 """Factor of the logarithm of the resistance along the wall."""
 

@@ -135,9 +135,9 @@ class QuiescentFluid:
         terms = ForceTerms(particles, span, last)
         terms.flow = self._flow(particles)
         self.forces.act(terms)
-        force, nothing = total(terms.explicit, particles.external) + particles.external, np.zeros((particles.count, 3))
+        force = total(terms.explicit, particles.external) + particles.external
         implicit, target, _ = implicit_coefficients(
-            terms.resistance, terms.inertia, particles.velocity, nothing, after_source(particles.velocity, force), span
+            terms.resistance, terms.inertia, particles.velocity, terms.unseen, after_source(particles.velocity, force), span
         )
         terms.receive(-implicit[:, None] * target)
         self.forces.finish(terms)

@@ -15,7 +15,7 @@ LINES = {
     "drag": "drag",
     "pressure": "pressure of model A, without buoyancy",
     "weight": "weight, less buoyancy",
-    "explicit": "lift, viscous stress, added mass, and wall drag across the slip",
+    "explicit": "lift, viscous stress and added mass",
     "agitation": "acceleration of the fluctuation of the fluid, or fluctuating force; not that in the drag",
     "history": "history force",
     "external": "forces from outside, and of a user",
@@ -36,6 +36,7 @@ class ForceTerms:
     resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid. It is stored as
                 that of the slip of the cells, b N
     fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the resistance of a line
+    turn        a force of the drag across the slip at the start of the step (N, 3) [N], as implicit as its resistance
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
@@ -47,6 +48,7 @@ class ForceTerms:
         self.particles, self.step, self.last_step = particles, step, last_step
         self.conductances: dict[str, Array] = {}
         self.fluctuations: dict[str, Array] = {}
+        self.across: dict[str, Array] = {}  # force of a line across the slip
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
@@ -60,6 +62,10 @@ class ForceTerms:
     def fluctuate(self, line: str, velocity: Array) -> None:
         """Add a fluctuation of the fluid velocity that acts through the resistance of a line."""
         _add(self.fluctuations, line, velocity)
+
+    def turn(self, line: str, force: Array) -> None:
+        """Add a force of a line across the slip. It acts through the resistance of this line."""
+        _add(self.across, line, force)
 
     def push(self, line: str, force: Array) -> None:
         """Add a force on the particles."""
@@ -79,6 +85,14 @@ class ForceTerms:
         return self.conductances[line] if line in self.conductances else np.zeros(self.particles.count)
 
     @property
+    def offsets(self) -> dict[str, Array]:
+        """Velocity that the resistance of a line adds to that of the cells (N, 3) [m/s]."""
+        offsets = dict(self.fluctuations)
+        for line, force in self.across.items():
+            _add(offsets, line, force / np.maximum(self.conductance(line), 1e-300)[:, None])
+        return offsets
+
+    @property
     def resistance(self) -> Array:
         """Conductance b N of all lines (N,) [kg/s]."""
         return total(self.conductances, np.zeros(self.particles.count))
@@ -92,21 +106,21 @@ class ForceTerms:
     def unseen(self) -> Array:
         """Part of the cells' velocity that does not act on every particle (N, 3) [m/s].
 
-        It is what the sampled flow lacks, less the fluctuation, which acts through its lines alone.
+        It is what the sampled flow lacks, less what the resistance of a line adds for itself alone.
         """
         unseen = self.flow.unseen
-        for line, velocity in self.fluctuations.items():
+        for line, velocity in self.offsets.items():
             share = self.conductance(line) / np.maximum(self.resistance, 1e-300)
             unseen = unseen - share[:, None] * velocity
         return unseen
 
     def receive(self, force: Array) -> None:
-        """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].
+        """Divide the force of all resistance among its lines, by their conductances and offsets (N, 3) [N].
 
         The first line gets what the others leave.
         """
         of_slip, resistance = force, np.maximum(self.resistance, 1e-300)
-        for line, velocity in self.fluctuations.items():
+        for line, velocity in self.offsets.items():
             of_slip = of_slip - self.conductance(line)[:, None] * velocity
         first, *others = [line for line in LINES if line in self.conductances] or ["drag"]
         self.implicit_force = {line: of_slip * (self.conductances[line] / resistance)[:, None] for line in others}

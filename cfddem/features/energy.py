@@ -56,7 +56,7 @@ LOST = {
     "implicit_drag": "by the implicit drag step",
     "viscous": "by viscous stress",
     "convection": "by the convection scheme",
-    "lift_and_added_mass": "by lift, viscous stress, added mass and wall drag across the slip, between the phases",
+    "lift_and_added_mass": "by lift, viscous stress and added mass, between the phases",
     "torque": "by the torque of the fluid on spin",
     "film": "by films",
     "film_shear": "by films to sliding and rolling",

@@ -77,7 +77,7 @@ def find_issues(
         *check_overlap(case, bed, collision),
         *check_surface_laws(case),
         *check_gpu(case),
-        *check_wall_drag(case, steps),
+        *check_wall_drag(case),
         *check_wet(case, wet),
         *check_walls_and_feeds(case),
         *check_vessel(case),

@@ -9,7 +9,6 @@ import numpy as np
 
 from cfddem.backend.law_choice import called_by_name
 from cfddem.case.bed import Species
-from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.particles.material_pairs import pair_table
 from cfddem.preflight.bed_estimate import BedEstimate
@@ -91,11 +90,6 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
     )
 
 
-def wall_material(case: Case, solid: Material) -> Material:
-    """Material of the sides of a column, that of its particles by default."""
-    return case.material[case.column.material] if case.column.material else solid
-
-
 def _film_rate(case: Case, species: Species, viscosity: float) -> float:
     """Largest resistance of a film over m*, of the smallest particles of a species at the smallest gap [1/s].
 
@@ -105,7 +99,8 @@ def _film_rate(case: Case, species: Species, viscosity: float) -> float:
     solid, law = case.material_of(species), case.laws.pair_laws.get("lubrication")
     bodies = [(solid, mass, radius)]
     if _has_walls(case):
-        bodies.append((wall_material(case, solid), 2.0 * mass, 2.0 * radius))
+        wall = case.material[case.column.material] if case.column.material else solid
+        bodies.append((wall, 2.0 * mass, 2.0 * radius))
     rates = []
     for other, mass, radius in bodies:
         gap = float(pair_table([solid, other])[0, 1]["roughness_gap"])

@@ -6,20 +6,16 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cfddem.case.bed import Jet
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.fluid.cell_counts import cell_counts, suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate, share_of_jet
-from cfddem.preflight.collision_estimate import wall_material
 from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
 from cfddem.preflight.issue import Issue, percent, plain
 from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.wall_checks import MOST_CELLS
-from closures.minimum_gap import asperities
-from closures.wall_drag import CLOSEST, along_wall, towards_wall
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -44,9 +40,6 @@ INEXACT_JET = 0.1
 
 FEWEST_CELLS = 4.0
 """Fewest cells over the height of a fluidised bed and over the wider side of its column [-]."""
-
-FARTHEST = 1e6
-"""Gap to a wall over the radius at which nothing is felt of it [-]."""
 
 PROFILE_RANGE = 2.0
 """Ratio of `viscosity_profile` to `viscosity` inside the bed from which estimates mislead [-]."""
@@ -188,7 +181,7 @@ def _check_jet(case: Case, jet: Jet) -> Iterator[Issue]:
         yield Issue("warning", "bed.jet.width", reason, remedy)
 
 
-def check_wall_drag(case: Case, steps: StepEstimate) -> Iterator[Issue]:
+def check_wall_drag(case: Case) -> Iterator[Issue]:
     """Check that drag beside walls has a fluid, walls at rest of a known shape, and no sum over several of them."""
     if case.laws.wall_drag == "none":
         return
@@ -219,49 +212,6 @@ def check_wall_drag(case: Case, steps: StepEstimate) -> Iterator[Issue]:
             'at 0.73 to 0.89 of the measured largest speed, with "nearest" within 2.5 % of it',
             'set laws.wall_drag = "nearest"',
         )  # fmt: skip
-    if case.has_fluid and not (case.has_films or case.bed.fixed):
-        yield from _check_step_beside_walls(case, steps)
-
-
-def _check_step_beside_walls(case: Case, steps: StepEstimate) -> Iterator[Issue]:
-    """Check that no sphere begins to oscillate beside a wall, at gaps beyond those of its asperities."""
-    fluid, carried = case.around, case.laws.added_mass_at(1.0) * case.around.density
-    gaps: dict[str, float] = {}
-    for name, species in case.species.items():
-        solid, radius = case.material_of(species), 0.5 * species.smallest_diameter
-        step = steps.fluid * 4.5 * fluid.viscosity / (radius**2 * (solid.density + carried))
-        least = max(asperities(solid.roughness, wall_material(case, solid).roughness) / radius, CLOSEST)
-        if growth_beside_wall(least, step) > 0.0:
-            gaps[name] = brentq(growth_beside_wall, least, FARTHEST, args=(step,))
-    if gaps:
-        name = max(gaps, key=gaps.__getitem__)
-        whose = f" of {name}" if len(case.species) > 1 else ""
-        yield Issue(
-            "warning", "laws.wall_drag",
-            f"without films a sphere that moves along a wall oscillates across it in fluid steps of {steps.fluid:.2g} "
-            f"s where the gap is below {gaps[name]:.2g} radii{whose}",
-            'set laws.lubrication = "nijssen", or a smaller run.fluid_step for a smaller gap',
-        )  # fmt: skip
-
-
-def growth_beside_wall(gap: float, step: float) -> float:
-    r"""Above 0 where motion towards and away from a wall grows from step to step, for a sphere that moves along it.
-
-    .. math:: a\,(1+c\,\theta) - (2-c),\qquad c = \frac{\Lambda}{1+\theta\Lambda},\quad
-              \theta = \frac{1+\Lambda}{2+\Lambda},\quad a = h\,\lambda_n - \Lambda
-
-    with :math:`\Lambda` the step over the time in which the implicit drag stops the sphere. The rest of the drag
-    across the wall, a, is that of the slip at the start of the step, and the implicit drag allows for it a step late:
-    the velocity across the wall changes in each step to :math:`(1-c-a)\,v + c\,\theta\,a\,v_{-}`.
-
-    gap   over the radius [-]
-    step  h, over mass, the added one included, and Stokes' resistance [-]
-    """
-    across, along = 1.0 / gap + towards_wall(gap), along_wall(gap)
-    implicit = step * max(along, 0.5 * across)
-    share = (1.0 + implicit) / (2.0 + implicit)
-    taken, rest = implicit / (1.0 + share * implicit), step * across - implicit
-    return rest * (1.0 + taken * share) - (2.0 - taken)
 
 
 def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:

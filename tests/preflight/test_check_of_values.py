@@ -9,7 +9,6 @@ from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.cli.explain_pages import key_lines, matching
 from cfddem.preflight.summary import preflight
-from scenarios.beds.settling.study import ten_cate
 
 GALLERY = gallery()
 
@@ -85,7 +84,7 @@ def test_a_material_that_many_species_name_is_missed_once() -> None:
 def test_the_sum_of_the_drag_beside_all_walls_is_warned_of() -> None:
     """Measured spheres fall at 0.735 to 0.893 of their largest speed with the sum, at 0.990 to 1.023 with "nearest"."""
     settling = GALLERY["settling"]
-    walls = {"column.sides": "no_slip", "laws.wall_drag": "all", "laws.lubrication": "nijssen"}
+    walls = {"column.sides": "no_slip", "laws.wall_drag": "all"}
     (issue,) = (each for each in preflight(settling.with_(**walls)).issues if each.key == "laws.wall_drag")
     assert issue.severity == "warning" and issue.in_report and "ten Cate" in issue.reason
     assert "0.73 to 0.89" in issue.reason and '"nearest"' in issue.remedy
@@ -94,40 +93,9 @@ def test_the_sum_of_the_drag_beside_all_walls_is_warned_of() -> None:
     assert "0.73 to 0.89" in " ".join(" ".join(key_lines(matching("laws.wall_drag"))).split())
 
 
-@pytest.mark.parametrize(("modulus", "step", "gap"), [(2e5, "0.0081", "1.4"), (1e6, "0.0043", "0.67")])
-def test_steps_in_which_a_sphere_oscillates_beside_a_wall_are_warned_of(modulus: float, step: str, gap: str) -> None:
-    """15 mm in oil of 3.73 Pa s; not with films, nor where the step is a fraction of the time in which drag acts."""
-    case = ten_cate(970.0, 3.73).with_(**{
-        "material.nylon.youngs_modulus": modulus, "column.sides": "no_slip", "laws.wall_drag": "nearest",
-        "run.fluid_step": 0.05,
-    })  # fmt: skip
-    (issue,) = (each for each in preflight(case).issues if each.key == "laws.wall_drag")
-    assert issue.severity == "warning" and "nijssen" in issue.remedy
-    assert f"steps of {step} s where the gap is below {gap} radii" in issue.reason
-    for changes in ({"laws.lubrication": "nijssen"}, {"fluid.viscosity": 1e-5}, {"laws.wall_drag": "none"}):
-        assert "laws.wall_drag" not in {each.key for each in preflight(case.with_(**changes)).issues}
-
-
-@pytest.mark.parametrize(
-    ("glass", "graphite", "gap"),
-    [(0.0, 0.0, ["0.004 radii of beads"]), (2.1e-6, 0.0, ["0.00086 radii of pellets"]), (2.1e-6, 1.2e-6, [])],
-)
-def test_a_gap_to_a_wall_is_that_of_a_species_and_above_its_asperities(
-    glass: float, graphite: float, gap: list[str]
-) -> None:
-    """0.004 radii of beads of 1 mm are 2.0 um, 0.00086 of pellets of 2.5 mm 1.1 um."""
-    case = GALLERY["segregation"].with_(**{
-        "column.sides": "no_slip", "laws.wall_drag": "nearest", "laws.lubrication": "none",
-        "material.glass.roughness": glass, "material.graphite.roughness": graphite,
-    })  # fmt: skip
-    reasons = [each.reason for each in preflight(case).issues if each.key == "laws.wall_drag"]
-    assert [each.split("below ")[1] for each in reasons] == gap
-
-
 def test_drag_beside_solid_cells_that_the_grid_counts_again_is_warned_of() -> None:
     """Beside flat sides of the box and smooth walls it is taken out."""
-    walls = {"column.sides": "no_slip", "laws.wall_drag": "nearest", "laws.lubrication": "nijssen"}
-    settling = GALLERY["settling"].with_(**walls)
+    settling = GALLERY["settling"].with_(**{"column.sides": "no_slip", "laws.wall_drag": "nearest"})
     for case in (GALLERY["settling"], settling.with_(vessel={"shape": "cylinder"})):
         assert not [each for each in preflight(case).issues if each.key == "laws.wall_drag"]
     round_column = preflight(settling.with_(**{"column.shape": "cylinder"})).issues

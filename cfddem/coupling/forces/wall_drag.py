@@ -6,10 +6,10 @@ over the nearest wall or all walls, with n the normal of the wall, less what the
 Every flat or round face is a wall: a capped cylinder has three. The sum over walls is an approximation. At finite Re it
 is added to the drag of the drag law: creeping flow near the wall, which is too much far from it.
 
-The transfer of momentum is implicit with one number per particle. This is the conductance along the slip; the
-remainder, which turns the slip, is explicit. With the drag, the conductance is at least half of that in any direction.
-Long fluid steps still let motion across a wall grow (:func:`~cfddem.preflight.flow_checks.growth_beside_wall`);
-`cfddem check` warns.
+The transfer of momentum is implicit with one number per particle, the conductance along the slip. What turns the slip
+acts through it, with the slip at the start of the step. With the drag, the conductance is at least half of that in any
+direction, b: motion across the slip changes by the factor 1 - h b/m/(1 + theta lambda) in a step, whose magnitude is
+below 1 in any step (theta and lambda of :mod:`cfddem.coupling.transfer`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ from cfddem.particles.walls.arrays import wall_arrays
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.nearest_point import nearest
 from cfddem.particles.walls.wall import Wall
-from closures.wall_drag import CLOSEST, along_wall, film_along_wall, towards_wall
+from closures.wall_drag import along_wall, film_along_wall, towards_wall
+
+CLOSEST = 1e-4
+"""Gap over the radius, at least; what grows further is in the films."""
 
 
 class WallTerms(NamedTuple):
@@ -51,7 +54,7 @@ class WallDrag(FluidForce):
     shear   whether they resist sliding
     """
 
-    name, lines = "wall_drag", ("drag", "explicit")
+    name, lines = "wall_drag", ("drag",)
 
     def __init__(
         self, walls: Sequence[Wall], which: Literal["nearest", "all"], *, film: bool, shear: bool = False
@@ -66,7 +69,7 @@ class WallDrag(FluidForce):
         """Resist the slip, and turn it."""
         beside = self.terms(terms.particles, terms.flow.slip)
         terms.resist("drag", beside.conductance)
-        terms.between("explicit", beside.force)
+        terms.turn("drag", beside.force)
 
     def terms(self, particles: Particles, slip: Array) -> WallTerms:
         """Extra drag at the slip u - v (N, 3) [m/s]."""
@@ -118,6 +121,6 @@ def _beside_one(place, radius, viscosity, slip, surfaces, options, n, terms):
 
 @threaded
 def _beside(position, radius, viscosity, slip, surfaces, options, terms):
-    """Conductance and explicit force of every particle."""
+    """Conductance and force across the slip of every particle."""
     for n in prange(len(radius)):
         _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), surfaces, options, n, terms)
