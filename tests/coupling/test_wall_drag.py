@@ -346,13 +346,13 @@ def test_a_coupled_sphere_moves_to_a_smooth_wall_as_the_law_says(
 @pytest.mark.parametrize("slope", [0.0, 0.25])
 @pytest.mark.parametrize("turn", [0.0, 0.2, 0.6, 0.785])
 def test_a_coupled_sphere_moves_along_a_smooth_wall_as_the_law_says(turn: float, slope: float) -> None:
-    """Down the wall of a cylinder and of a cone, at three gaps: within 4 % of the terminal velocity."""
+    """Down the wall of a cylinder and of a cone, at three gaps: within 3 % of the terminal velocity."""
     errors = []
     for gap in (0.75, 1.5, 3.0):
         found = beside_a_smooth_wall(turn, slope, False, gaps=(gap, 0.3), until=2.5)
         errors += found[found[:, 0] > 1.2, 2].tolist()
     print(f"errors from {min(errors):+.4f} to {max(errors):+.4f} of the terminal velocity")
-    assert len(errors) > 50 and np.abs(errors).max() < 0.04
+    assert len(errors) > 50 and np.abs(errors).max() < 0.03
 
 
 @pytest.mark.slow
