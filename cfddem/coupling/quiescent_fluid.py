@@ -137,7 +137,12 @@ class QuiescentFluid:
         self.forces.act(terms)
         force = total(terms.explicit, particles.external) + particles.external
         implicit, target, _ = implicit_coefficients(
-            terms.resistance, terms.inertia, particles.velocity, terms.unseen, after_source(particles.velocity, force), span
+            terms.resistance,
+            terms.inertia,
+            particles.velocity,
+            terms.unseen,
+            after_source(particles.velocity, force),
+            span,
         )
         terms.receive(-implicit[:, None] * target)
         self.forces.finish(terms)
