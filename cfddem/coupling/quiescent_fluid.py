@@ -136,13 +136,9 @@ class QuiescentFluid:
         terms.flow = self._flow(particles)
         self.forces.act(terms)
         force = total(terms.explicit, particles.external) + particles.external
+        last_step = after_source(particles.velocity, force)
         implicit, target, _ = implicit_coefficients(
-            terms.resistance,
-            terms.inertia,
-            particles.velocity,
-            terms.unseen,
-            after_source(particles.velocity, force),
-            span,
+            terms.resistance, terms.inertia, particles.velocity, terms.unseen, last_step, span
         )
         terms.receive(-implicit[:, None] * target)
         self.forces.finish(terms)
