@@ -160,7 +160,7 @@ def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
         number, rest = np.arange(count), count % apart if periodic else 0
         turns.append(np.where(number < count - rest, number % apart, number - count + rest + apart))
     (z, y, x), counts = np.ix_(*turns), [int(turn.max()) + 1 for turn in turns]  # local: every rank knows the whole box
-    turn = (z * counts[1] + y) * counts[2] + x
+    turn = ((z * counts[1] + y) * counts[2] + x).astype(np.uint16)
     exchanged, cells = np.zeros((len(NEIGHBOURS), *kernel.grid.shape)), math.prod(kernel.grid.shape)
     of_neighbours = np.stack([
         kernel.grid.part(np.roll(turn, [-step for step in steps], axis=(0, 1, 2))).ravel() for steps in NEIGHBOURS

@@ -36,7 +36,7 @@ class ForceTerms:
     resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid. It is stored as
                 that of the slip of the cells, b N
     fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the resistance of a line
-    turn        a force of the drag across the slip at the start of the step (N, 3) [N], as implicit as its resistance
+    turn        the rest of the force of a line, at the slip of the start of the step (N, 3) [N], through its resistance
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
@@ -48,7 +48,7 @@ class ForceTerms:
         self.particles, self.step, self.last_step = particles, step, last_step
         self.conductances: dict[str, Array] = {}
         self.fluctuations: dict[str, Array] = {}
-        self.across: dict[str, Array] = {}  # force of a line across the slip
+        self.rest: dict[str, Array] = {}  # of the force of a line, see `turn`
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
@@ -64,8 +64,8 @@ class ForceTerms:
         _add(self.fluctuations, line, velocity)
 
     def turn(self, line: str, force: Array) -> None:
-        """Add a force of a line across the slip. It acts through the resistance of this line."""
-        _add(self.across, line, force)
+        """Add the rest of the force of a line. It acts through the resistance of this line."""
+        _add(self.rest, line, force)
 
     def push(self, line: str, force: Array) -> None:
         """Add a force on the particles."""
@@ -88,7 +88,7 @@ class ForceTerms:
     def offsets(self) -> dict[str, Array]:
         """Velocity that the resistance of a line adds to that of the cells (N, 3) [m/s]."""
         offsets = dict(self.fluctuations)
-        for line, force in self.across.items():
+        for line, force in self.rest.items():
             _add(offsets, line, force / np.maximum(self.conductance(line), 1e-300)[:, None])
         return offsets
 

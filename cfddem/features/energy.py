@@ -49,7 +49,7 @@ GAINED = {
 """Energy gained; a negative line is a loss."""
 
 LOST = {
-    "drag": "by drag, at the slip of the particles, with wall drag along it",
+    "drag": "by drag, at the slip of the particles, wall drag included",
     "history": "to the fluid by the history force",
     "drag_in_cells": "by drag, in velocity differences within the kernel and the cell",
     "pressure_in_cells": "where the pressure gradient at the particles differs from that of the cells",

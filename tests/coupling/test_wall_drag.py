@@ -145,7 +145,7 @@ MINIMUM = 1e-4 * RADIUS
 def test_a_sphere_feels_the_exact_resistance_towards_the_wall(film: bool) -> None:
     """Stokes' drag, the film and the extra drag together: within 0.2 % at every gap."""
     found, aside = extra([0.0, 0.0, 1.0], GAPS, film=film)
-    assert np.abs(aside[:-1]).max() < 1e-12
+    assert film or np.abs(aside).max() < 1e-12  # all of it implicit
     for gap, one in zip(GAPS, found[:, 2].tolist()):
         strength = film_strength(VISCOSITY, RADIUS)
         of_film = film_resistance(strength, gap * RADIUS, MINIMUM, RADIUS) / STOKES if film else 0.0
@@ -368,7 +368,7 @@ def test_a_coupled_sphere_lands_as_the_equation_of_motion_says(oil: tuple[float,
 
 def test_motion_across_a_wall_decays_in_long_steps() -> None:
     """15 mm in oil along the floor, at small gaps, in steps of 8.1 ms."""
-    for gap in (0.14, 1.1):
+    for gap in (0.01, 0.14, 1.1):
         case = settling.ten_cate(*OIL).with_(**{
             "material.nylon.youngs_modulus": 2e5, "column.width": 8.0 * EDGE, "column.height": 8.0 * EDGE,
             "bed.positions": [(4.3 * EDGE, 4.1 * EDGE, (1.0 + gap) * RADIUS_OF_NYLON)],
@@ -380,7 +380,7 @@ def test_motion_across_a_wall_decays_in_long_steps() -> None:
             simulation.step()
             speeds.append(float(simulation.particles.velocity[0, 2]))
         to_and_fro = np.abs(np.diff(speeds, 2))
-        assert to_and_fro[-1] < 0.2 * to_and_fro[5], to_and_fro
+        assert to_and_fro[-1] < 1e-2 * to_and_fro[5], to_and_fro
 
 
 def test_a_bead_without_films_rolls_along_the_floor() -> None:

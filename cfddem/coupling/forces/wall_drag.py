@@ -6,10 +6,10 @@ over the nearest wall or all walls, with n the normal of the wall, less what the
 Every flat or round face is a wall: a capped cylinder has three. The sum over walls is an approximation. At finite Re it
 is added to the drag of the drag law: creeping flow near the wall, which is too much far from it.
 
-The transfer of momentum is implicit with one number per particle, the conductance along the slip. What turns the slip
-acts through it, with the slip at the start of the step. With the drag, the conductance is at least half of that in any
-direction, b: motion across the slip changes by the factor 1 - h b/m/(1 + theta lambda) in a step, whose magnitude is
-below 1 in any step (theta and lambda of :mod:`cfddem.coupling.transfer`).
+The transfer of momentum is implicit with one number per particle, a conductance c: that along the slip, but with the
+drag at least two thirds of the resistance b in any direction. The rest of the force acts through it, too, with the slip
+at the start of the step. So motion in that direction changes by the factor 1 - h b/m/(1 + theta lambda) in a step, with
+lambda = h c/m and theta of :mod:`cfddem.coupling.transfer`. It is above -1/2 in any step.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class WallTerms(NamedTuple):
     """Extra drag beside walls."""
 
     conductance: Array  # (N,) [kg/s]
-    force: Array  # across the slip (N, 3) [N]
+    force: Array  # the rest (N, 3) [N]
 
 
 class WallDrag(FluidForce):
@@ -112,7 +112,7 @@ def _beside_one(place, radius, viscosity, slip, surfaces, options, n, terms):
         extra, factor = _force(normal, gap, slip, options)
         force, largest = (plus(force, extra), largest + factor) if options[0] else (extra, factor)
     stokes, square = 6.0 * math.pi * viscosity * radius, dot(slip, slip)
-    least = max(0.5 * (largest - 1.0), 0.0)  # Stokes' drag is 1
+    least = max((2.0 * largest - 1.0) / 3.0, 0.0)  # two thirds of all, of which Stokes' drag is 1
     factor = max(dot(force, slip) / square, least) if square > 0.0 else least
     terms.conductance[n] = stokes * factor
     aside = times(stokes, minus(force, times(factor, slip)))
@@ -121,6 +121,6 @@ def _beside_one(place, radius, viscosity, slip, surfaces, options, n, terms):
 
 @threaded
 def _beside(position, radius, viscosity, slip, surfaces, options, terms):
-    """Conductance and force across the slip of every particle."""
+    """Conductance and the rest of the force of every particle."""
     for n in prange(len(radius)):
         _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), surfaces, options, n, terms)
