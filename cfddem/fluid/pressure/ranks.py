@@ -113,6 +113,10 @@ class SharedLevel(Level):
         """See `Level.take_diagonal`; ghosts are not relaxed."""
         super().take_diagonal()
         self.without_ghosts(self.inverse)
+        # the diagonal of a ghost lacks faces beyond the array: only its rank knows whether its row is dry
+        ghosts = [slice(None)] if 1 in self.axes else [0, -1] if 2 in self.axes else []
+        for planes in ghosts:
+            self.wet[planes] = 0, self.shape[1]
 
     def sweep(self, sweeps: int, backward: bool) -> None:
         """Relax all cells of all ranks so many times."""
