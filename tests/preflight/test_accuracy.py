@@ -16,7 +16,7 @@ from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.preflight import accuracy
-from cfddem.preflight.accuracy import BY_KERNEL, GAS, LIQUID, PACKED_SHARP, PACKED_SMEARED, widening
+from cfddem.preflight.accuracy import BY_KERNEL, GAS, GAS_BY_KERNEL, LIQUID, PACKED_SHARP, PACKED_SMEARED, widening
 from cfddem.preflight.summary import preflight
 from cfddem.run import build
 from scenarios.beds.gas_bed.study import mueller
@@ -124,6 +124,16 @@ def test_numbers_without_a_table_are_those_of_the_pages() -> None:
     text = (ROOT / "scenarios" / "validation" / "agitation" / "README.md").read_text()
     rows = re.findall(r"(?m)^\| (?:filter of )?(\d\.\d) d[^|]*\| [\d.]+ \| ([\d.]+) \| [\d.]+ \|$", text)
     assert tuple((float(width), float(ratio)) for width, ratio in rows) == BY_KERNEL
+
+
+def test_what_the_kernel_changes_in_gas_is_of_the_stored_table() -> None:
+    """The mean height of the small gas bed, and the row of a case with another kernel."""
+    rows = {row["quantity"]: row for row in json.loads((TABLES / "gas-bed-steps.json").read_text())["rows"]}
+    for width, ratio in GAS_BY_KERNEL:
+        if width != 1.5:
+            row = rows[f"0.5 ms, 2.40 d, kernel of {width:g} d, 2.9 s: mean height"]
+            assert round(row["value"] / row["reference"], 3) == ratio
+    assert shown(mueller().with_(**{"laws.kernel_width": 2.0}))["this kernel: bed height"][0] == 0.944
 
 
 def test_packed_beds_have_what_was_measured_in_fixed_ones() -> None:
