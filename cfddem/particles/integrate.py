@@ -323,11 +323,12 @@ def gather_forces(i, system, near):
     """
     particles, edges, memory = system.particles, system.edges, system.memory
     force, couple, moment = at(particles.applied, i), NOTHING, NOTHING
-    impulse, turn, end = NOTHING, NOTHING, edges.start[i]
+    impulse, turn, end = NOTHING, NOTHING, np.uint64(edges.start[i])
+    far, walls = np.uint64(near), np.uint64(edges.between_particles)
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
         if JOINT:
-            end = list_due(place, end, system)
+            end = list_due(k, place, end, system)
         if DRIFTING:
             impulse = plus(impulse, times(sign, at(memory.film_push, k)))
         if SHEAR:
@@ -336,11 +337,11 @@ def gather_forces(i, system, near):
             force = plus(force, times(sign, at(memory.bridge_force, k)))
         if BRIDGE_APART and BRIDGE_SLIDING:
             couple = plus(couple, at(memory.bridge_turn, k))
-        if BOND and k < edges.between_particles:
+        if BOND and k < walls:
             force = plus(force, times(sign, at(memory.bond_force, k)))
             couple = plus(couple, at(memory.bond_couple, k))
             moment = plus(moment, times(sign, at(memory.bond_moment, k)))
-        if (FILM or BRIDGE) and near <= k < edges.between_particles:
+        if (FILM or BRIDGE) and far <= k < walls:
             if BRIDGE or DRIFTING:
                 continue
             break  # pairs that cannot touch come last

@@ -20,7 +20,7 @@ from cfddem.particles.interactions.kinematics import (
 )
 from cfddem.particles.interactions.shear_film import put_impulses
 from cfddem.particles.interactions.slots import BRIDGE_APART, BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
-from cfddem.particles.pair_graph import geometry, places_of
+from cfddem.particles.pair_graph import edge_role, geometry, places_of
 from cfddem.particles.vectors import NOTHING, across, dot, put, times
 
 FIELDS = (
@@ -57,6 +57,8 @@ JOINT_FIELDS = (
     Field("joint_terms", "1", 4, "scratch", meaning="terms of sums over all films"),
 )
 """Of pairs whose films or bridges are solved together. All but `joint_row` hold one row for each of these."""
+
+_0, _1 = np.uint64(0), np.uint64(1)
 
 LARGE_TURN = 0.1
 """Angle by which the normal turns in a step, above which terms of second order in the step say nothing [rad]."""
@@ -218,11 +220,11 @@ def collect(system):
 
 
 @inline
-def list_due(place, end, system):
-    """Let the edge at a place of `incident` follow the listed ones of its particle if it is solved."""
-    memory, incident = system.memory, system.edges.incident[place]
-    memory.joint_incident[end] = incident
-    return end + (1 if is_due(np.int64(incident) ^ (np.int64(incident) >> 63), memory) else 0)
+def list_due(k, place, end, system):
+    """Let edge k, at a place of `incident`, follow the listed ones of its particle if it is solved."""
+    memory = system.memory
+    memory.joint_incident[end] = system.edges.incident[place]
+    return end + (_1 if is_due(k, memory) else _0)
 
 
 @inline
@@ -243,9 +245,11 @@ def mark_due(k, system, step):
 @inline
 def list_all_due(i, system):
     """List the edges of particle i that are solved with the others."""
-    end = system.edges.start[i]
-    for place in places_of(i, system.edges):
-        end = list_due(place, end, system)
+    edges = system.edges
+    end = np.uint64(edges.start[i])
+    for place in places_of(i, edges):
+        k, _ = edge_role(edges.incident[place])
+        end = list_due(k, place, end, system)
     system.particles.joint_end[i] = end
 
 

@@ -97,8 +97,12 @@ def _apart(k, system):
 def pair_touches(n, system):
     """Note whether the solids of one pair of particles touch, and whether they did at the last step."""
     memory, k = system.memory, np.uint64(n)
-    _, distance, radii = _apart(k, system)
-    touches = 1 if distance - radii < memory.minimum_gap[k] else 0
+    if DRIFTING:
+        gap = memory.film_gap[k]  # the loop over films has found it
+    else:
+        _, distance, radii = _apart(k, system)
+        gap = distance - radii
+    touches = 1 if gap < memory.minimum_gap[k] else 0
     if FILM and not DRIFTING:  # the force of the film has been added to that of the contact
         touches = 1
     memory.touching[k] = 2 * (memory.touching[k] & 1) + touches
