@@ -113,9 +113,9 @@ def require_features(state: Mapping[str, Any], present: Collection[str]) -> None
 def require_unwritten(particles: Particles) -> None:
     """Refuse a change of `applied`, which belongs to the run."""
     written = particles[APPLIED.name]
-    changed = ((particles.applied != written) & ~np.isnan(written)).any(axis=1)  # local: components of a row
+    changed = (particles.applied != written) & ~np.isnan(written)
     if changed.any():  # local: every rank has its own particles
-        name = int(particles.id[np.argmax(changed)])  # local: the first on this rank
+        name = int(particles.id[np.argmax(changed) // 3])  # local: the first on this rank
         remedy = "write particles.external, or Simulation.add(force)"
         raise InputError(f"applied of particle {name}", "written from outside", "left to the run", remedy)
 
