@@ -73,8 +73,7 @@ def one_thread() -> Iterator[None]:
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages are written without their pictures, which take seconds: for tests of the words on a page."""
-    for module in ("report_page", "comparison_page"):
-        monkeypatch.setattr(f"cfddem.plotting.{module}.encoded", lambda *_: "")
+    monkeypatch.setattr("cfddem.plotting.report_page.encoded", lambda *_: "")
 
 
 @pytest.fixture(autouse=True)

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.case.openings import with_openings
 from cfddem.case.patches import CasePatch
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import CaseVessel
-from cfddem.case.vessel_surface import surface_in
+from cfddem.case.vessel_surface import surface_in, with_openings
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder

@@ -13,8 +13,17 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
-from cfddem.case.holes import samples_by_cells
-from cfddem.case.patches import ENDS, PLANES, CasePatch, along, lengths_of, middle_of, on_the_side, open_area_of
+from cfddem.case.patches import (
+    ENDS,
+    PLANES,
+    CasePatch,
+    along,
+    lengths_of,
+    middle_of,
+    on_the_side,
+    open_area_of,
+    samples_by_cells,
+)
 from cfddem.case.tables import CaseTables
 from cfddem.fluid.cut_cells import section
 from cfddem.fluid.grid import layers

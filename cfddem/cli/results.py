@@ -108,7 +108,7 @@ def compare(
     if output.suffix.lower() not in (".html", ".png"):
         raise InputError("output", str(output), "a file that ends in .html or .png")
     result = compared(folders)
-    from cfddem.plotting.comparison_page import comparison_page
+    from cfddem.plotting.report_page import comparison_page
 
     written = comparison_page(folders, output, result)
     if json:

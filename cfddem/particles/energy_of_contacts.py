@@ -37,7 +37,7 @@ from cfddem.particles.particle_feature import Engine
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
-from closures.blend import contact_share
+from closures.contact import contact_share
 from closures.friction import coulomb_limit
 
 FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL, HYSTERESIS = range(8)

@@ -11,9 +11,9 @@ import numpy as np
 from cfddem.backend.errors import CfddemError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.liquid import Spray
-from cfddem.case.openings import outline
 from cfddem.case.patches import ENDS, PLANES, CasePatch, lengths_of, middle_of
 from cfddem.case.schema import Case
+from cfddem.case.vessel_surface import outline
 from cfddem.case.walls import CaseWall
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank
 from cfddem.preflight.bed_estimate import estimate_bed

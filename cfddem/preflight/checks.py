@@ -19,15 +19,16 @@ from cfddem.preflight.geometry_checks import (
     check_bed_size,
     check_length,
     check_particle_size,
+    check_patches,
     check_positions,
     check_scales,
     check_start_box,
     check_units,
+    check_vessel,
 )
 from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, rounded_up
 from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate, available_memory, estimate_cost, estimate_steps
-from cfddem.preflight.vessel_checks import check_patches, check_vessel
 from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 

@@ -24,7 +24,7 @@ from cfddem.case.compare import CaseData, points_of, read_table
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.plotting.case_drawing import case_drawing
-from cfddem.plotting.comparison_page import histories
+from cfddem.plotting.report_page import histories
 from cfddem.preflight.summary import preflight
 from cfddem.run.runner import Run
 

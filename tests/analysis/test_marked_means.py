@@ -15,8 +15,7 @@ from cfddem.analysis.report import report
 from cfddem.analysis.report_text import lines as report_lines
 from cfddem.analysis.report_text import markdown
 from cfddem.io.reading import open_run
-from cfddem.plotting.comparison_page import comparison_page
-from cfddem.plotting.report_page import render
+from cfddem.plotting.report_page import comparison_page, render
 
 
 def test_the_drift_is_that_of_the_rows_that_are_averaged(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from cfddem.particles.interactions.slots import (
     tangential_stiffness,
 )
 from cfddem.particles.vectors import LEAST, NOTHING, across, cross, dot, minus, plus, select, times
-from closures.blend import contact_share
+from closures.contact import contact_share
 from closures.friction import coulomb_limit, dry_or_lubricated
 
 ROLLING_MOBILITY = 3.5

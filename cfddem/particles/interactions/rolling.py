@@ -9,7 +9,7 @@ from cfddem.backend.compile import inline
 from cfddem.model.fields import Field
 from cfddem.particles.interactions.slots import FILM, rolling_torque, secant_stiffness
 from cfddem.particles.vectors import LEAST, NOTHING, across, dot, plus, select, times
-from closures.blend import contact_share
+from closures.contact import contact_share
 from closures.friction import (
     dry_or_lubricated,
     rolling_damping,
