@@ -25,7 +25,6 @@ from cfddem.preflight.weak_scaling import (
     time_of_a_rank,
 )
 from cfddem.run.division import WORTHWHILE, cost_of, expected_shares, most_ranks, require_parallel
-from cfddem.run.history import units_of
 
 MOST_RANKS = 100_000
 """Largest number of processes that is checked."""
@@ -46,6 +45,8 @@ def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> P
     """
     result = preflight(case)
     if case.compare:
+        from cfddem.run.history import units_of  # loads the compiler, which other checks lack
+
         result = result.with_errors(check_quantities(case, units_of(case)))
     return result if ranks is None or not result.rows else _with_ranks(result, case, ranks, shape)
 
