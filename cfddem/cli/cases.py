@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 import shlex
 import sys
+from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +21,6 @@ from cfddem.backend.json_text import as_json
 from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
 from cfddem.cli.json_output import print_json
-from cfddem.cli.printing import with_colour
 from cfddem.cli.ranks import on_ranks
 
 if TYPE_CHECKING:
@@ -150,6 +152,19 @@ def check(
     else:
         print("\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
+
+
+_COLOURS = {"ok": "32", "warning": "33", "error": "31"}
+"""Terminal colour codes of the words that state a status."""
+
+
+def with_colour(lines: Iterable[str]) -> Iterator[str]:
+    """Lines with their leading status word coloured on a terminal; unchanged elsewhere, or where NO_COLOR is set."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
+        yield from lines
+        return
+    for line in lines:
+        yield re.sub(r"^(ok|warning|error)(?=:)", lambda word: f"\x1b[{_COLOURS[word[0]]}m{word[0]}\x1b[0m", line)
 
 
 def stability(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 import inspect
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+import numpy as np
 from cyclopts import Parameter
 
+from cfddem.backend.compile import announce_compilation
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
@@ -17,13 +22,12 @@ from cfddem.case.materials import Material
 from cfddem.cli.cases import LAWS
 from cfddem.cli.explain_pages import descriptions
 from cfddem.cli.json_output import print_json
-from cfddem.cli.printing import announce_compilation, show
 from cfddem.io.files import require_folder
 from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
 from scenarios.collisions.film_impact.figures import draw_moments
 from scenarios.collisions.film_impact.figures import movie as write_movie
 from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
-from scenarios.collisions.immersed_pair.ranges import UNITS, CollisionRange, stokes_numbers, write_csv
+from scenarios.collisions.immersed_pair.study import Collision
 from scenarios.collisions.three_spheres.figures import MEANINGS, draw_map
 
 SIMPLE = (float, int, bool, str)
@@ -85,6 +89,22 @@ def command(
     return run
 
 
+def show(values: Mapping[str, Any], units: Mapping[str, str]) -> None:
+    """Print a result as aligned lines."""
+    shown = {name: "" if value is None else units.get(name, "") for name, value in values.items()}
+    print("\n".join(table([(name, f"{_readable(values[name])} {unit}") for name, unit in shown.items()], gap=2)))
+
+
+def _readable(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(_readable(element) for element in value) or "-"
+    return str(value)
+
+
 def _simple(annotation: Any) -> Any:
     """The part of an annotation that a command line can give; None where there is none."""
     parts = get_args(annotation) if get_origin(annotation) in (UnionType, Union) else (annotation,)
@@ -98,6 +118,80 @@ def _simple(annotation: Any) -> Any:
 def _option(name: str, kind: Any, default: Any, text: str) -> inspect.Parameter:
     option = Annotated[kind, Parameter(help=text, negative="")]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=option)
+
+
+# ---------------------------------------------------------------- collisions over a range of Stokes numbers
+
+
+UNITS = {
+    "velocity": "m/s",
+    "viscosity": "Pa s",
+    "rebound_angle_striker": "deg",
+    "rebound_angle_relative": "deg",
+    "minimum_gap": "m",
+    "stop_gap": "m",
+    "spin": "rad/s",
+}
+"""Units of the values of a collision; the others have none."""
+
+IN_A_RANGE = 20
+"""Stokes numbers of `LOW..HIGH`, in even ratios."""
+
+NUMBERS = {
+    "stokes", "restitution", "restitution_tangential", "friction_used", *UNITS,
+}  # fmt: skip
+"""Values of a collision that are numbers."""
+
+MOST = 1000
+"""Largest number of collisions of one command."""
+
+
+@dataclass(frozen=True)
+class CollisionRange:
+    """Collisions that differ in their Stokes number."""
+
+    collisions: Sequence[Collision]
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values of all collisions."""
+        return {"collisions": [collision.summary() for collision in self.collisions]}
+
+
+def stokes_numbers(text: str) -> list[float]:
+    """Stokes numbers of a text: one, several with commas, or a range in even ratios.
+
+    errors  InputError
+
+    >>> stokes_numbers("30"), stokes_numbers("1,10"), [round(each, 2) for each in stokes_numbers("1..100")[:3]]
+    ([30.0], [1.0, 10.0], [1.0, 1.27, 1.62])
+    """
+    limit = "a number, numbers with commas, or LOW..HIGH above 0, such as 1..1000"
+    span = re.fullmatch(r"(.+?)\.\.(.+)", text)
+    try:
+        numbers = [float(number) for number in (span.groups() if span else text.split(","))]
+    except ValueError:
+        raise InputError("stokes", text, limit) from None
+    if span:
+        low, high = numbers
+        if not 0.0 < low < high < np.inf:
+            raise InputError("stokes", text, limit, "the smaller one first")
+        return [float(number) for number in np.geomspace(low, high, IN_A_RANGE)]
+    if len(numbers) > MOST:
+        raise InputError("stokes", len(numbers), f"at most {MOST} numbers")
+    return numbers
+
+
+def write_csv(collisions: Sequence[Collision], path: Path) -> None:
+    """Write one row for each collision; values that are not known are empty."""
+    rows = [collision.summary() for collision in collisions]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(f"{name} [{UNITS.get(name, '-')}]" if name in NUMBERS else name for name in rows[0])
+        table.writerows([_cell(number) for number in row.values()] for row in rows)
+
+
+def _cell(value: Any) -> Any:
+    return "" if value is None else " ".join(map(str, value)) if isinstance(value, list) else value
 
 
 def _collide(

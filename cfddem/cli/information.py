@@ -23,7 +23,6 @@ from cfddem.backend.law_choice import import_laws
 from cfddem.backend.tables import table
 from cfddem.cli.cases import LAWS
 from cfddem.cli.json_output import json_schema, print_json
-from cfddem.cli.printing import announce_compilation
 
 SCHEMA = "case, or an output by the middle of its value `schema`: report, check, sweep, error, and others"
 
@@ -90,9 +89,9 @@ def doctor(
 
     Example: cfddem doctor --quick
     """
-    from cfddem.cli.information import examine
-
     if not quick:
+        from cfddem.backend.compile import announce_compilation  # loads the compiler
+
         announce_compilation()
     answers = []
     for answer in examine(quick):

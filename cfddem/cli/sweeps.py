@@ -15,7 +15,6 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.tables import line_width
 from cfddem.cli.cases import AS_IT_IS, CASE, JSON, Changes, print_warnings
 from cfddem.cli.json_output import print_json
-from cfddem.cli.printing import announce_compilation
 
 if TYPE_CHECKING:
     from cfddem.studies.calibration import Calibration, Trial
@@ -103,6 +102,8 @@ def sweep(
         print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
 
     if workers.jobs == 1 and workers.scheduler is None and not json:
+        from cfddem.backend.compile import announce_compilation  # loads the compiler
+
         announce_compilation()
     outcomes = run_all(
         path, chosen, folder, overrides=shared, jobs=workers.jobs, scheduler=workers.scheduler,
@@ -180,6 +181,8 @@ def calibrate(
         print(f"{trial.number:>4}  {values:<40}  {result}", file=sys.stderr if json else sys.stdout, flush=True)
 
     if effort.jobs == 1 and not json:
+        from cfddem.backend.compile import announce_compilation  # loads the compiler
+
         announce_compilation()
     if collide is not None:
         if case is not None or effort.jobs != 1:

@@ -11,7 +11,6 @@ from cyclopts import Parameter
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.tables import table
 from cfddem.cli.json_output import print_json
-from cfddem.cli.printing import announce_compilation
 from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS, measure
 from scenarios.validation.targets import validate as run
 
@@ -41,6 +40,8 @@ def validate(
     Example: cfddem validate binary-collision
     """
     if not json:
+        from cfddem.backend.compile import announce_compilation  # loads the compiler
+
         announce_compilation()
     if target != "all" and target not in TARGETS:
         raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
@@ -85,6 +86,8 @@ def bench(
     Example: cfddem bench dem --particles 10000
     """
     if not json:
+        from cfddem.backend.compile import announce_compilation  # loads the compiler
+
         announce_compilation()
     from scenarios.beds.gas_bed import study as gas_bed
     from scenarios.beds.wet_bed import study as wet_bed

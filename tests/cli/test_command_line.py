@@ -273,7 +273,7 @@ def test_the_schema_is_json() -> None:
 
 
 def test_the_status_is_coloured_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem.cli.printing import with_colour
+    from cfddem.cli.cases import with_colour
 
     lines = ["warning: bed.count: too many", "  a warning: inside a line"]
     monkeypatch.delenv("NO_COLOR", raising=False)

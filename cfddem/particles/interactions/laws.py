@@ -14,7 +14,7 @@ from cfddem.backend.law_set import bind_arguments, check_compiles, compile_sourc
 from cfddem.backend.named import NAMES, can_be_named
 from cfddem.model.fields import Field
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
-from cfddem.particles.interactions import bond, bridge, bridge_apart, contact, film, joint_films, rolling, shear_film
+from cfddem.particles.interactions import bond, bridge, bridge_apart, contact, film, joint_films, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGES, BridgeLaws, NoBridges
 from cfddem.particles.interactions.contact_law import COLUMNS, ContactLaw, Function, contact_named
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
@@ -194,7 +194,7 @@ class Laws(NamedTuple):
     @property
     def contact_fields(self) -> list[Field]:
         """What pairs remember of their contacts, and what the loop over contacts writes."""
-        return [*contact.FIELDS, *self.contact_law.memory, *(rolling.FIELDS if self.rolling != "none" else ())]
+        return [*contact.FIELDS, *self.contact_law.memory, *(contact.ROLLING_FIELDS if self.rolling != "none" else ())]
 
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
@@ -229,7 +229,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "RESCALED": laws.spring == "rescaled",
         "FROM_OVERLAP": laws.friction_onset == "overlap",
         "ROLLING": laws.rolling != "none",
-        "rolling_torque": rolling.ROLLINGS[laws.rolling],
+        "rolling_torque": contact.ROLLINGS[laws.rolling],
         **(built_in() if laws.film else {}),
         **({"film_sliding": shear_film.built_in_sliding} if laws.shears else {}),
         "POTENTIAL": False,
@@ -267,7 +267,7 @@ TAKEN = {
         *film.FIELDS,
         film.OUTSIDE,
         *shear_film.FIELDS,
-        *rolling.FIELDS,
+        *contact.ROLLING_FIELDS,
         *RECORD_FIELDS,
     )
 }

@@ -27,10 +27,9 @@ from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, thinnest_fil
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_apart import resist_apart
 from cfddem.particles.interactions.bridge_solution import held_gap
-from cfddem.particles.interactions.contact import contact, contact_state
+from cfddem.particles.interactions.contact import contact, contact_state, resist_rolling
 from cfddem.particles.interactions.film import renew_film
 from cfddem.particles.interactions.kinematics import sphere_kinematics
-from cfddem.particles.interactions.rolling import resist_rolling
 from cfddem.particles.interactions.shear_film import pair_arms, renew_shear, slip_and_roll
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
