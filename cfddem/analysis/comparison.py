@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import re
@@ -107,10 +108,13 @@ def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
     Copies of one file do not differ.
     """
     flat = [dict(_values(case.model_dump(mode="json", fallback=_law_name), "")) for case in cases]
-    keys = dict.fromkeys(key for values in flat for key in values)
-    rows = {key: [values.get(key) for values in flat] for key in keys}
-    differ = {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
-    return {key: values for key, values in differ.items() if not _same_files(key, values)}
+    return {key: values for key, values in _differing(flat).items() if not _same_files(key, values)}
+
+
+def _differing(tables: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Keys whose values differ, with that of each table; None where it has none."""
+    rows = {key: [table.get(key) for table in tables] for key in dict.fromkeys(itertools.chain(*tables))}
+    return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
 
 
 def _same_files(key: str, files: Sequence[Any]) -> bool:
@@ -126,9 +130,7 @@ def _same_files(key: str, files: Sequence[Any]) -> bool:
 def _changed_laws(runs: Sequence[RunData]) -> dict[str, list[Any]]:
     """Fingerprints of users' laws that differ, with that of each run; None where a run has no such law."""
     used: list[dict[str, Any]] = [run.provenance.get("laws", {}) for run in runs]
-    kinds = dict.fromkeys(kind for laws in used for kind in laws)
-    rows = {f"laws.{kind}, source": [laws.get(kind, {}).get("fingerprint") for laws in used] for kind in kinds}
-    return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
+    return _differing([{f"laws.{kind}, source": law.get("fingerprint") for kind, law in of.items()} for of in used])
 
 
 def lines(result: dict[str, Any]) -> list[str]:

@@ -42,7 +42,7 @@ import time as clock
 from collections.abc import Mapping
 from types import FunctionType
 
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import config, get_num_threads, njit, prange, set_num_threads
 from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 from numba.core.options import TargetOptions
@@ -253,14 +253,9 @@ def use_threads(count: int | None) -> int:
         try:
             set_num_threads(count)
         except ValueError as refusal:
-            raise InputError("threads", count, f"1 to {_most_threads()} on this machine") from refusal
+            most = config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+            raise InputError("threads", count, f"1 to {most} on this machine") from refusal
     return int(get_num_threads())
-
-
-def _most_threads() -> int:
-    import numba
-
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 def announced(message: str) -> None:

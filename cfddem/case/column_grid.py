@@ -15,7 +15,7 @@ from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
 from cfddem.fluid.thin_walls import divided, thin_wall
-from cfddem.particles.walls.stl import stamp
+from cfddem.particles.walls.meshes import stamp
 
 
 def grid_of(case: CaseTables) -> Grid:

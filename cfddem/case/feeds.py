@@ -79,10 +79,9 @@ def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
                 yield InputError(f"laws.{key}", shown(law), f"{none!r} where there is a feed in a fluid", remedy)
     for number, feed in enumerate(case.feed):
         names = list(case.bed.species)
-        if feed.species is None and names:
-            yield InputError(f"feed.{number}.species", None, f"given, {nearest('', names)}")
-        elif feed.species is not None and feed.species not in names:
-            limit = nearest(feed.species, names) if names else "left out for a bed of one species"
-            yield InputError(f"feed.{number}.species", shown(feed.species), limit)
+        if (feed.species or "") not in (names or [""]):
+            limit = nearest(feed.species or "", names) if names else "left out for a bed of one species"
+            value, opening = (shown(feed.species), "") if feed.species else (None, "given, ")
+            yield InputError(f"feed.{number}.species", value, opening + limit)
         if case.bed.fixed:
             yield InputError("bed.fixed", True, "false where there is a feed")

@@ -18,7 +18,7 @@ from cfddem.case.vessel_surface import start_box_in, surface_in
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.triangles import signed_volume
 from cfddem.model.triangles import Array, inside_surface
-from cfddem.particles.walls.stl import stamp
+from cfddem.particles.walls.meshes import stamp
 
 Side = Literal["inside", "outside", "behind"]
 

@@ -19,7 +19,7 @@ from cfddem.case.vessel_shape import ROUND_OFF, CaseVessel
 from cfddem.fluid.surfaces import Joined, Plane, Surface, cylinder, together, turned
 from cfddem.fluid.triangles import ClosedSurface, closed_surface, section_area, through_ends
 from cfddem.model.triangles import Array
-from cfddem.particles.walls.stl import stamp
+from cfddem.particles.walls.meshes import stamp
 
 IN_MILLIMETRES = 30.0
 """Size of a surface over that of the column from which its file may be in millimetres [-]."""

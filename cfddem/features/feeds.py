@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cfddem.backend.errors import RunFailed
-from cfddem.case.bed import CaseFeed, Species
+from cfddem.case.bed import CaseFeed
 from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.particle_properties import SPECIES, diameters_of
 from cfddem.case.patches import PLANES, CasePatch, along, middle_of
@@ -39,6 +40,11 @@ ENTERED = Field(
 """Declared on the particles of a run with outlets; without feeds, those of the start count from 0."""
 
 
+def _drained(case: Case) -> bool:
+    """Whether particles leave during a run."""
+    return bool(case.outlet or case.drains)
+
+
 class Feeds(CaseFeature):
     """Feeds and outlets of a case. A particle that enters replaces fluid of its own volume, or leaves room for it."""
 
@@ -50,23 +56,23 @@ class Feeds(CaseFeature):
                  "number of particles that are due, and wait for a free place in the box of a feed",
                  lambda feeds, _: feeds.waiting, lambda case: case.feed),
         Measured("removed_count", "1", "recorded", "number of particles that outlets have removed so far",
-                 lambda feeds, _: feeds.removed[0], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.removed[0], _drained),
         Measured("removed_mass", "kg", "recorded", "mass of the particles that outlets have removed so far",
-                 lambda feeds, _: feeds.removed[1], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.removed[1], _drained),
         Measured("residence_time", "s", "recorded",
                  "mean residence time of the particles that outlets have removed so far; with feeds, of fed ones",
-                 lambda feeds, _: feeds.of_residence_times[0], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.of_residence_times[0], _drained),
         Measured("residence_time_deviation", "s", "recorded", "standard deviation of these residence times",
-                 lambda feeds, _: feeds.of_residence_times[1], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.of_residence_times[1], _drained),
         Measured("residence_time_10", "s", "recorded",
                  "residence time that a tenth of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[2], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.of_residence_times[2], _drained),
         Measured("residence_time_50", "s", "recorded",
                  "residence time that half of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[3], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.of_residence_times[3], _drained),
         Measured("residence_time_90", "s", "recorded",
                  "residence time that nine tenths of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times[4], lambda case: _drained(case)),
+                 lambda feeds, _: feeds.of_residence_times[4], _drained),
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
@@ -198,21 +204,15 @@ class Opening(ParticleOutlet):
         return np.asarray(inside & (outward > 0.0) & (beyond >= 0.0))
 
 
-def _drained(case: Case) -> bool:
-    """Whether particles leave during a run."""
-    return bool(case.outlet or case.drains)
-
-
 def _feed(case: Case, table: CaseFeed, number: int) -> Feed:
     """A feed of a case."""
     species = fed_species(case, table)
-    names = list(case.species)
     middle = table.corner[2] + 0.5 * table.size[2]
     return Feed(
         feed_rate(case, table),
         table.corner,
         table.size,
-        _sizes(species),
+        partial(diameters_of, species),
         case.material_of(species).density,
         velocity=table.velocity,
         material=list(case.material).index(case.material_name_of(species)),
@@ -220,28 +220,19 @@ def _feed(case: Case, table: CaseFeed, number: int) -> Feed:
         seed=(case.bed.seed, number, _FED),
         begin=table.begin,
         end=math.inf if table.end is None else table.end,
-        finish=_fresh(None if table.species is None else names.index(table.species), _drained(case)),
+        finish=_fresh(case, table),
     )
 
 
-def _sizes(species: Species) -> Callable[[int, np.random.Generator], np.ndarray]:
-    """Diameters of a species, drawn from the generator of a feed."""
-
-    def draw(count: int, generator: np.random.Generator) -> np.ndarray:
-        return diameters_of(species, count, generator)
-
-    return draw
-
-
-def _fresh(species: int | None, timed: bool) -> Callable[[Particles], None]:
+def _fresh(case: Case, table: CaseFeed) -> Callable[[Particles], None]:
     """Declares the species of new particles, that they have not landed, and where it counts that they enter now."""
 
     def declare(fresh: Particles) -> None:
         fresh.declare(LANDED, np.zeros(fresh.count, np.int8))
-        if timed:
+        if _drained(case):
             fresh.declare(ENTERED, np.full(fresh.count, math.inf))
-        if species is not None:
-            fresh.declare(SPECIES, np.full(fresh.count, species, np.int32))
+        if table.species:
+            fresh.declare(SPECIES, np.full(fresh.count, list(case.species).index(table.species), np.int32))
 
     return declare
 

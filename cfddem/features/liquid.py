@@ -12,7 +12,7 @@ from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.model.fields import Field
-from cfddem.particles.agglomerates import AgglomerateSizes, agglomerates, carried_liquid, sizes, summary
+from cfddem.particles.agglomerates import AgglomerateSizes, agglomerates, carried_liquid, summary
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 
@@ -123,7 +123,7 @@ def _fill_snapshot_fields(solver: ParticleSolver) -> None:
     places = np.searchsorted(all_ids, particles.id[: particles.owned])
     particles.liquid_carried[: particles.owned] = _carried(solver)[places]
     particles.agglomerate[: particles.owned] = lowest[belongs][places]
-    particles.agglomerate_size[: particles.owned] = sizes(belongs)[belongs][places]
+    particles.agglomerate_size[: particles.owned] = np.bincount(belongs)[belongs][places]
 
 
 # ---------------------------------------------------------------- measures

@@ -39,14 +39,6 @@ class AgglomerateSizes(NamedTuple):
     joined: float  # share of the particles that have a bridge to another
 
 
-def sizes(belongs: Numbers) -> Numbers:
-    """Number of particles in each agglomerate (k,).
-
-    belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`
-    """
-    return np.bincount(belongs)  # local: numbers of all ranks
-
-
 def size_distribution(belongs: Numbers) -> tuple[Numbers, Numbers]:
     """The sizes that occur, and how many agglomerates have each (k,), (k,).
 
@@ -68,7 +60,7 @@ def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
     """
     if count == 0:
         return AgglomerateSizes(float("nan"), 0, float("nan"))
-    members = sizes(agglomerates(first, second, count)).astype(float)
+    members = np.bincount(agglomerates(first, second, count)).astype(float)
     alone = float(np.count_nonzero(members == 1.0))  # local: likewise
     return AgglomerateSizes(
         mean_by_particle=float((members * members).sum()) / count,  # local: likewise

@@ -185,6 +185,11 @@ class ParticleSolver:
         return self.find(Bridges)
 
     @property
+    def bridge_count(self) -> int:
+        """Number of liquid bridges."""
+        return self.bridges.count if self.bridges else 0
+
+    @property
     def collisions(self) -> CollisionRecord | None:
         """The record of collisions, with `record`."""
         return self.find(CollisionRecord)

@@ -157,7 +157,7 @@ def bench(
         "gpu": name_of_gpu() if gpu else "",
         "film": film or full,
         "films that resist sliding": full,
-        "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
+        "bridges per particle": run.bridge_count / count,
         "steps": steps,
         "listed pairs per particle": run.edges.between_particles / count,
         "peak memory of the process [MB]": _peak_memory(),

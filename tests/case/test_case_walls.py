@@ -16,8 +16,8 @@ from cfddem.case.schema import Case
 from cfddem.case.walls import CaseWall
 from cfddem.model.triangles import inside_surface
 from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.walls.meshes import read_stl
 from cfddem.particles.walls.motion import Motion
-from cfddem.particles.walls.stl import read_stl
 from cfddem.preflight.summary import Preflight, preflight
 from cfddem.run.initial_particles import particles_of
 

@@ -22,8 +22,7 @@ from cfddem.case.walls import SHAPES, CaseWall, forget_shape, register
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.meshes import Mesh
-from cfddem.particles.walls.stl import read_stl
+from cfddem.particles.walls.meshes import Mesh, read_stl
 from cfddem.particles.walls.wall import Wall
 from cfddem.plotting.case_drawing import case_drawing
 from cfddem.preflight.summary import preflight

@@ -85,7 +85,7 @@ class Laws(NamedTuple):
             raise InputError(
                 "film_motions", self.film_motions, '"normal" without films, and with the integrator "verlet"'
             )
-        if self.film_motions == "full_twist" and self.film_law is not None and self.film_law.sliding is not None:
+        if self.film_motions == "full_twist" and self.slides_by_itself:
             limit, remedy = (
                 '"full" for a film with its own resistance to sliding',
                 "twisting is known for the built-in film",
@@ -118,7 +118,12 @@ class Laws(NamedTuple):
     @property
     def shears(self) -> bool:
         """Whether films resist sliding and rolling."""
-        return self.film_motions != "normal" or (self.film_law is not None and self.film_law.sliding is not None)
+        return self.film_motions != "normal" or self.slides_by_itself
+
+    @property
+    def slides_by_itself(self) -> bool:
+        """Whether a user's film has its own resistance to sliding."""
+        return bool(self.film_law and self.film_law.sliding)
 
     @property
     def drifting(self) -> bool:

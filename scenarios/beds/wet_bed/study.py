@@ -115,7 +115,7 @@ def _cost(run: Simulation, before: dict[str, float], spent: float, time: float) 
         "shares": {part: seconds / sum(parts.values()) for part, seconds in parts.items() if seconds > 0.0},
         "listed pairs": solver.edges.between_particles,
         "contacts": int((solver.gap < 0.0).sum()),
-        "bridges": 0 if solver.bridges is None else solver.bridges.count,
+        "bridges": solver.bridge_count,
     }
 
 

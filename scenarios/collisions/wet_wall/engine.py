@@ -111,7 +111,7 @@ def integrate(wet: Wet, solids: tuple[Material, Material], speed: float, along: 
         gap, rate = rows[-1][0] - wet.radius, rows[-1][1]
         touched = min(touched, run.time) if gap < 0.0 else touched
         after = run.time - touched
-        broken = after > 0.0 and gap > 0.0 and (run.bridges is None or run.bridges.count == 0)
+        broken = after > 0.0 and gap > 0.0 and run.bridge_count == 0
         rests = after > 0.0 and (gap >= 0.0 > rate or (gap < 0.0 and after > BOUNCES * hertz))
         if broken or rests or run.time > LONGEST:
             return _path(wet, np.array(times), np.array(rows).T, stuck=not broken)
