@@ -107,7 +107,8 @@ def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
 
     Copies of one file do not differ.
     """
-    flat = [dict(_values(case.model_dump(mode="json", fallback=_law_name), "")) for case in cases]
+    dumps = (case.model_dump(mode="json", fallback=lambda law: getattr(law, "__name__", str(law))) for case in cases)
+    flat = [dict(_values(dump, "")) for dump in dumps]
     return {key: values for key, values in _differing(flat).items() if not _same_files(key, values)}
 
 
@@ -193,10 +194,6 @@ def _key_results(results: Sequence[Report]) -> dict[str, list[KeyResult | None]]
         for key_result in result.key_results:
             by_name.setdefault(key_result.name, [None] * len(results))[place] = key_result
     return by_name
-
-
-def _law_name(value: Any) -> str:
-    return getattr(value, "__name__", str(value))
 
 
 def _values(values: Any, key: str) -> Iterator[tuple[str, Any]]:

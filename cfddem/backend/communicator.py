@@ -120,7 +120,7 @@ class Communicator:
 
     def first(self, value: Value | None) -> Value | None:
         """The value of the lowest rank that passes one; None if all pass None."""
-        return self._combine(value, _not_none)  # type: ignore[no-any-return]
+        return self._combine(value, lambda first, second: second if first is None else first)  # type: ignore[no-any-return]
 
     def broadcast(self, value: Value, root: int = 0) -> Value:
         """The value that rank `root` passes, on all ranks."""
@@ -203,11 +203,6 @@ def _rows(array: np.ndarray, axis: Axis) -> tuple[np.ndarray, tuple[int, ...]]:
     kept = tuple(array.shape[d] for d in stay)
     count = math.prod(array.shape[d] for d in summed)
     return np.ascontiguousarray(array.transpose([*stay, *sorted(summed)])).reshape(math.prod(kept), count), kept
-
-
-def _not_none(first: Any, second: Any) -> Any:
-    """The first of two values that is not None."""
-    return second if first is None else first
 
 
 def _plain(value: Any) -> Any:

@@ -41,15 +41,8 @@ def particle_properties(case: Case) -> ParticleProperties:
         diameters.append(diameters_of(species, counts[name], seed))
         density.append(np.full(counts[name], case.material_of(species).density))
         material.append(np.full(counts[name], names.index(species.material or names[0]), np.int32))
-    return ParticleProperties(
-        np.concatenate(diameters), np.concatenate(density), np.concatenate(material), species_of(case)
-    )
-
-
-def species_of(case: Case) -> np.ndarray:
-    """Number of the species of every particle, by id (N,)."""
-    counts = list(case.counts.values())
-    return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    of_species = np.repeat(np.arange(len(counts), dtype=np.int32), list(counts.values()))
+    return ParticleProperties(np.concatenate(diameters), np.concatenate(density), np.concatenate(material), of_species)
 
 
 def diameters_of(species: Species, count: int, seed: Seed) -> Array:

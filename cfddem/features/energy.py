@@ -111,14 +111,11 @@ class EnergyLedger(CaseFeature):
     name = "energies"
 
     def __init__(self, case: Case, simulation: Any) -> None:
-        self.particle_solver, self.fluid, self.coupling = (
-            simulation.particle_solver,
-            simulation.fluid if simulation.has_fluid else None,
-            simulation.coupling if simulation.has_fluid else None,
-        )  # fmt: skip
+        self.simulation, self.particle_solver = simulation, simulation.particle_solver
         self._count: Energies = self.particle_solver.feature(Energies)
         self._acted_on = simulation.is_acted_on  # whether the line of forces from outside is shown
-        self._work = None if self.coupling is None else CouplingWork(self.particle_solver.particles, self.coupling)
+        particles, has_fluid = self.particle_solver.particles, simulation.has_fluid
+        self._work = CouplingWork(particles, simulation.coupling) if has_fluid else None
         self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
         self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
         self.start = self._stored()
@@ -151,8 +148,9 @@ class EnergyLedger(CaseFeature):
 
     def after_fluid_step(self, terms: CouplingTerms) -> None:
         """Add the work on the fluid, after `Coupling.apply` and before the particles move."""
-        assert self.fluid is not None and self._work is not None
-        fluid, sums, done = self.fluid, self.sums, budgets.works(self.fluid)
+        assert self._work is not None
+        fluid, sums = self.simulation.fluid, self.sums
+        done = budgets.works(fluid)
         sums["inflow"] += done.inflow + done.inlet_drag
         sums["driving"] += done.driving
         sums["model_b"] += done.model_b + (done.solids if fluid.model == "B" else 0.0)
@@ -195,13 +193,13 @@ class EnergyLedger(CaseFeature):
         """The ledger now: a value for each column of `FIELDS` that applies to the run [J]."""
         stored, sums = self._stored(), self._totals()
         lines = {name: stored[name] - self.start[name] for name in stored}
-        absent = set() if self.fluid is not None else set(_OF_FLUID)
+        absent = set() if self.simulation.has_fluid else set(_OF_FLUID)
         if not self._acted_on() and sums["external"] == 0.0:
             absent.add("external")
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
         absent |= {*EVERY_CHANNEL} - {*self._count.channels}
-        absent |= {"history"} - {*(self.coupling.forces.lines if self.coupling else ())}
+        absent |= {"history"} - {*self.simulation.forces.lines}
         names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
@@ -248,10 +246,10 @@ class EnergyLedger(CaseFeature):
             "potential": -fallen,
             **forms,
         }
-        if self.fluid is None:
+        if not self.simulation.has_fluid:
             return stored
         return stored | {
-            "fluid_kinetic": budgets.kinetic_energy(self.fluid),
+            "fluid_kinetic": budgets.kinetic_energy(self.simulation.fluid),
             "added_mass": added_mass_energy(particles, particle_solver.communicator),
             # the fluid has used the voidage before the last step and a half
             "deferred_momentum": -(self._recent[0] + 0.5 * self._recent[1]),

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfddem.analysis.measured import MeasuredComparison
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import ERROR, Array, Column, Points, read_table
+from cfddem.case.compare import ERROR, Array, Points, read_table
 from cfddem.io.files import require_folder
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
 from scenarios.collisions.immersed_pair.study import Collision
@@ -80,7 +80,8 @@ def values_at(points: Points, collide: Collide, places: Array) -> Array:
 
 def read_points(path: Path) -> Points:
     """Measured points of a file."""
-    columns = {_meaning(column): column for column in read_table(path)}
+    meanings = {word: name for name, words in NAMES.items() for word in words}
+    columns = {meanings.get(column.name, column.name): column for column in read_table(path)}
     places = [name for name in ("stokes", "angle") if name in columns]
     values = [name for name in ("restitution", "rebound_angle", "rebound_angle_striker") if name in columns]
     if len(places) != 1 or len(values) != 1:
@@ -97,10 +98,6 @@ def read_points(path: Path) -> Points:
         raise InputError(f"{path} error", None, f"above 0, in the unit of {value.name}")
     errors = np.full(len(place), np.nan) if error is None else error.values
     return Points(path.stem, values[0], value.unit, places[0], place, value.values, errors)
-
-
-def _meaning(column: Column) -> str:
-    return next((name for name, words in NAMES.items() if column.name in words), column.name)
 
 
 def _draw(comparison: MeasuredComparison, path: Path) -> None:

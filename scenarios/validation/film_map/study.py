@@ -110,17 +110,14 @@ def means_of(data: RunData, run: Run) -> dict[str, float]:
     if films.any():
         numbers["approaches"] = 2.0 * float(rows["weight"][films].sum()) / (case.particle_count * (end - begin))
         numbers["gap_ratio"] = float(np.median((rows["elastohydrodynamic_gap"] / rows["roughness_gap"])[films]))
-    lost = {name: np.ptp(data.history[f"energy_{name}"][inside][[0, -1]]) for name in LOST if _is_in(data, name)}
+    recorded = [name for name in LOST if f"energy_{name}" in data.history]
+    lost = {name: np.ptp(data.history[f"energy_{name}"][inside][[0, -1]]) for name in recorded}
     by_collisions = sum(lost[name] for name in OF_COLLISIONS if name in lost)
     numbers["dissipated"] = float(by_collisions / sum(lost.values()))
     numbers["dissipation"] = float(by_collisions) / (case.particle_count * (end - begin))
     numbers["largest_remainder"] = float(np.abs(data.history["energy_remainder"]).max() / sum(lost.values()))
     numbers["stokes_of_fluctuations"] = stokes_of(case, math.sqrt(numbers["granular_temperature"]))
     return {name: value for name, value in numbers.items() if math.isfinite(value)}
-
-
-def _is_in(data: RunData, line: str) -> bool:
-    return f"energy_{line}" in data.history
 
 
 # ---------------------------------------------------------------- figure
