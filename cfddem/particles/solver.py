@@ -24,8 +24,7 @@ from cfddem.particles.integrate import integrate
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.pair_loops import PIECE, PLACES, PackedFields, loop_choices
-from cfddem.particles.listing import NeighbourLists
-from cfddem.particles.named_state import named_state, restored_list
+from cfddem.particles.listing import NeighbourLists, named_state, restored_list
 from cfddem.particles.pair_graph import Edges, gaps, shifts
 from cfddem.particles.particle_feature import ParticleFeature
 from cfddem.particles.state import Particles
