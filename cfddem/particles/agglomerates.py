@@ -60,7 +60,7 @@ def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
     """
     if count == 0:
         return AgglomerateSizes(float("nan"), 0, float("nan"))
-    members = np.bincount(agglomerates(first, second, count)).astype(float)
+    members = np.bincount(agglomerates(first, second, count)).astype(float)  # local: numbers of all ranks
     alone = float(np.count_nonzero(members == 1.0))  # local: likewise
     return AgglomerateSizes(
         mean_by_particle=float((members * members).sum()) / count,  # local: likewise

@@ -391,11 +391,13 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
         return base
     listed = base if isinstance(base, list) else [base]
     flow, inlets = _before(listed[0]), of_side.inlets
-    entering = np.sum([of_side.shares[name] for name in inlets], axis=0) > 0.0
-    covered = entering | np.any([of_side.whole(name) for name in of_side.patches if name not in inlets], axis=0)
+    others = [of_side.whole(name) for name in of_side.patches if name not in inlets]
+    entering = np.sum([of_side.shares[name] for name in inlets], axis=0) > 0.0  # local: every rank knows all patches
+    covered = entering | np.any(others, axis=0)  # local: likewise
     axis, high = PLANES[side]
     replaced = any(patch.shape == "whole" and not patch.brings for patch in of_side.patches.values())
-    if replaced or np.all(covered | ~grid_of(case).open[layers(axis, -1 if high else 0)]):
+    closed = ~grid_of(case).open[layers(axis, -1 if high else 0)]
+    if replaced or np.all(covered | closed):  # local: likewise
         listed = [NoSlip()]  # nothing of the side itself is left
     conditions = [*listed]
     for name, patch in of_side.patches.items():

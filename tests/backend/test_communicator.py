@@ -40,7 +40,6 @@ LOCAL_FILES = {
     "particles/walls/": "every rank knows all walls",
     "particles/initial/": "every rank makes all particles before the run starts",
     "coupling/self_disturbance_tables.py": "every rank computes the tables of the whole lattice",
-    "run/patches.py": "every rank knows the patches of the whole box",
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
     "fluid/cut_cells.py": "every rank knows the smooth walls of the whole box",
