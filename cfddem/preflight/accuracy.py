@@ -108,10 +108,10 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
         return
     for figure in LIQUID if case.in_liquid else GAS:
         yield figure.name, figure.value, "", figure.note(case.surface)
-    quantity, table, measured = OF_KERNEL[case.in_liquid]
+    quantity, by_kernel, bed_of_it = OF_KERNEL[case.in_liquid]
     own = case.laws.kernel_width
-    if own != 1.5 and table[0][0] <= own <= table[-1][0]:
-        yield f"this kernel: {quantity}", between(table, own), "", f"over 1.5 d, {measured}"
+    if own != 1.5 and by_kernel[0][0] <= own <= by_kernel[-1][0]:
+        yield f"this kernel: {quantity}", between(by_kernel, own), "", f"over 1.5 d, {bed_of_it}"
 
 
 def _is_no_plain_bed(case: Case) -> bool:
