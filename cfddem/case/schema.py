@@ -64,12 +64,12 @@ class Case(CaseTables):
         return self
 
     @model_validator(mode="after")
-    def _a_random_packing_fills_a_box(self) -> Case:
-        if self.bed.start in AT_RANDOM and (self.line or self.vessel):
-            where = "a vessel" if self.vessel else "a cylinder"
+    def _a_random_packing_fills_a_box_or_cylinder(self) -> Case:
+        if self.bed.start in AT_RANDOM and self.vessel and not (self.vessel.is_round and self.vessel.is_upright):
             raise InputError(
-                "bed.start", self.bed.start, f'"poured" or "suspended" in {where}', "a packing fills a box"
-            )
+                "bed.start", self.bed.start, '"poured" or "suspended" in this vessel',
+                "a packing fills a column, or an upright cylinder",
+            )  # fmt: skip
         return self
 
     @model_validator(mode="after")

@@ -68,11 +68,14 @@ def within(grid: Grid, surface: Surface) -> Grid:
     return cut_grid  # type: ignore[no-any-return]
 
 
+@lru_cache(maxsize=8)
 def open_share(grid: Grid) -> Array | NDArray[np.bool_]:
-    """Share of every cell that holds fluid (nz, ny, nx)."""
+    """Share of every cell that holds fluid (nz, ny, nx); computed once for a grid, as measures ask for it in every row."""
     if not grid.walls:
         return grid.open
-    return np.asarray(volumes(grid.walls, grid.spacing, *_full_centres(grid)) * grid.open)
+    share = np.asarray(volumes(grid.walls, grid.spacing, *_full_centres(grid)) * grid.open)
+    share.flags.writeable = False
+    return share
 
 
 def _refuse_hidden_walls(grid: Grid, surface: Surface) -> None:

@@ -37,6 +37,7 @@ PARTIAL = ".partial"
 _REMEDY = {
     errno.ENOSPC: "free space on that disk; earlier files are intact",
     errno.EDQUOT: "free space within your quota; earlier files are intact",
+    errno.EFBIG: "raise the limit of file sizes (ulimit -f), or choose another disk; earlier files are intact",
     errno.EACCES: "choose a folder with write permission",
     errno.EPERM: "choose a folder with write permission",
     errno.EROFS: "choose a folder on a writable disk",
@@ -113,7 +114,7 @@ class _Disk:
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file, self._failure = file, None
-        self.seek, self.tell, self.read = file.seek, file.tell, file.read
+        self.tell, self.read = file.tell, file.read
 
     _failure: OSError | None
 
@@ -128,6 +129,10 @@ class _Disk:
         except OSError as failure:
             self._failure = failure
             return otherwise
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        """See `io.RawIOBase`; a buffered file first writes what it holds, which may fail, too."""
+        return self._tried(lambda: self._file.seek(place, whence), place)
 
     def write(self, content: Any) -> int:
         """See `io.RawIOBase`."""

@@ -54,11 +54,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
             ).particles
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start in ("packed", "expanded"):
-        space = (*case.column.size[:2], case.column.height if bed.start == "packed" else expanded_height(case))
-        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(space)
-        x, y, z = case.column.periodic
-        repeats = (x, y, z or bed.fixed)  # fixed particles are a slice of a longer bed
-        places, _ = random_packing(diameters, share, bed.seed, shape=space, periodic=repeats)
+        places = _at_random(case, diameters)
     elif bed.start == "placed":
         places = np.array(bed.positions, float)
     elif bed.species:
@@ -109,6 +105,23 @@ def expanded_height(case: Case) -> float:
     """Height of the bed in the flow, by the balance of weight and drag; at most that of the column [m]."""
     lowest = sum(case.volumes.values()) / (LARGEST_EXPANDED_FRACTION * case.floor_area)
     return min(case.column.height, max(lowest, estimate_bed(case).height))
+
+
+def _at_random(case: Case, diameters: Array) -> Array:
+    """A random packing of the column, or of an upright round vessel, up to the lid or the expected height (N, 3) [m]."""
+    width, depth, height = case.column.size
+    if case.bed.start == "expanded":
+        height = expanded_height(case)
+    share = float((math.pi / 6.0 * diameters**3).sum()) / (case.floor_area * height)
+    x, y, z = case.column.periodic
+    repeats = (x, y, z or case.bed.fixed)  # fixed particles are a slice of a longer bed
+    if not case.line:
+        return random_packing(diameters, share, case.bed.seed, shape=(width, depth, height), periodic=repeats)[0]
+    across = 2.0 * case.line[0][1]
+    places, _ = random_packing(
+        diameters, share, case.bed.seed, shape=(across, across, height), periodic=repeats, in_cylinder=True
+    )
+    return places + 0.5 * np.array((width - across, depth - across, 0.0))
 
 
 def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) -> Array:

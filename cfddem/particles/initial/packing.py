@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cfddem.backend.compile import serial
@@ -101,8 +103,9 @@ def random_packing(
     shape: tuple[float, float, float] = (1.0, 1.0, 1.0),
     most_sweeps: int = 20_000,
     periodic: tuple[bool, bool, bool] = (True, True, True),
+    in_cylinder: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pack spheres at random in a box, periodic or between walls, to a given solid fraction.
+    """Pack spheres at random in a box, periodic or between walls, or in a cylinder, to a given solid fraction.
 
     Spheres start at random positions and are moved apart until no overlap exceeds :data:`OVERLAP_LIMIT`. No sphere
     overlaps a wall.
@@ -113,7 +116,8 @@ def random_packing(
     shape           of the box, as ratios of its edges
     most_sweeps     through all pairs, after which the packing is given up
     periodic        along each axis; else the box ends at two walls
-    returns         centres (N, 3) [m] and edges of the box (3,) [m]
+    in_cylinder     an upright cylinder takes the place of the box: the first two edges are its diameter, with walls
+    returns         centres (N, 3) [m] and edges of the box, or of that around the cylinder (3,) [m]
 
     Raises PackingFailed if the fraction is not reached within `most_sweeps`.
     """
@@ -122,10 +126,17 @@ def random_packing(
     diameters = np.asarray(diameters, float)
     volume = float(np.sum(np.pi / 6.0 * diameters**3)) / solid_fraction
     ratios = np.asarray(shape, float)
-    box = ratios * (volume / np.prod(ratios)) ** (1.0 / 3.0)
+    part_of_box = math.pi / 4.0 if in_cylinder else 1.0
+    box = ratios * (volume / (part_of_box * np.prod(ratios))) ** (1.0 / 3.0)
     low, high = _centres_between_walls(diameters, box, np.array(periodic))
     margin = np.where(periodic, 0.0, 0.5 * diameters[:, None])
-    position = margin + np.random.default_rng(seed).uniform(0.0, 1.0, (len(diameters), 3)) * (box - 2.0 * margin)
+    chosen = np.random.default_rng(seed).uniform(0.0, 1.0, (len(diameters), 3))
+    outmost = np.full(len(diameters), np.inf)
+    if in_cylinder:
+        outmost = 0.5 * (box[0] - diameters)
+        distance, angle = 0.5 * np.sqrt(chosen[:, 0]), 2.0 * math.pi * chosen[:, 1]
+        chosen[:, 0], chosen[:, 1] = 0.5 + distance * np.cos(angle), 0.5 + distance * np.sin(angle)
+    position = margin + chosen * (box - 2.0 * margin)
     spheres = make_particles(position, 0.5 * diameters, 1000.0)
     skin, images = 0.2 * float(diameters.min()), np.where(periodic, box, np.inf)
     worst = np.inf
@@ -133,8 +144,8 @@ def random_packing(
         wrap(spheres.position, images)
         graph = list_edges(spheres, wall_arrays(), 0.0, skin, images)
         worst = _push_apart(
-            spheres.view, graph.flat_graph, shifts(images).reshape(-1), low.reshape(-1), high.reshape(-1), _SWEEPS,
-            0.25 * skin, OVERLAP_LIMIT,
+            spheres.view, graph.flat_graph, shifts(images).reshape(-1), (low.reshape(-1), high.reshape(-1)), outmost,
+            _SWEEPS, 0.25 * skin, OVERLAP_LIMIT,
         )  # fmt: skip
         if worst <= OVERLAP_LIMIT:
             wrap(spheres.position, images)
@@ -171,12 +182,14 @@ _SWEEPS = 25
 
 
 @serial
-def _push_apart(particles, edges, shift, low, high, sweeps, reach, limit):
+def _push_apart(particles, edges, shift, bounds, outmost, sweeps, reach, limit):
     """Move overlapping spheres apart, each by half of the overlap; returns the largest one left, over the radius.
 
-    low, high  bounds of every coordinate
+    bounds   lowest and highest value of every coordinate
+    outmost  largest distance of every sphere from the upright axis in the middle; infinite in a box
     """
     position, radius = particles.position, particles.radius
+    low, high = bounds
     move = np.zeros_like(position)
     worst = 0.0
     for sweep in range(sweeps + 1):
@@ -203,6 +216,13 @@ def _push_apart(particles, edges, shift, low, high, sweeps, reach, limit):
         for place in range(len(move)):
             moved = position[place] + min(max(move[place], -reach), reach)
             position[place] = min(max(moved, low[place]), high[place])
+        for i in range(len(outmost)):
+            if outmost[i] < np.inf:
+                x, y = 0.5 * (low[3 * i] + high[3 * i]), 0.5 * (low[3 * i + 1] + high[3 * i + 1])
+                away = np.sqrt((position[3 * i] - x) ** 2 + (position[3 * i + 1] - y) ** 2)
+                if away > outmost[i]:
+                    position[3 * i] = x + (position[3 * i] - x) * outmost[i] / away
+                    position[3 * i + 1] = y + (position[3 * i + 1] - y) * outmost[i] / away
     return worst
 
 
