@@ -69,6 +69,9 @@ def find_case(name: Path | None) -> Path:
     of_gallery = gallery_files()
     if str(name) in of_gallery:
         return of_gallery[str(name)]
+    if name.suffix or len(name.parts) > 1 or name.is_dir():
+        remedy = "cfddem new writes one" if not name.is_dir() else "name the case file in it"
+        raise InputError("case", str(name), "an existing file", remedy)
     raise InputError("case", str(name), f"a file, or {nearest(str(name), of_gallery)}")
 
 

@@ -187,7 +187,7 @@ def _limit(report: Any) -> str:
         if name in context:
             return f"{word} {context[name]:g}"
     if kind == "missing" and isinstance(report["loc"][-1], int):
-        return "a longer list"
+        return f"a list of at least {report['loc'][-1] + 1} values"
     if kind == "literal_error":
         choices = re.findall(r"'([^']*)'", str(context.get("expected", "")))
         return nearest(str(report["input"])[:LONGEST], choices)
@@ -316,8 +316,7 @@ TABLES: dict[str, str] = {
     "vapour": "Not there: more than one vapour, its effect on the density of the gas, and reactions.",
     "evaporation": "Not there: condensation, and pores; what bonds are made of has no mass.",
     "fluid": "Not there: turbulence models, compressibility, free surfaces, and a viscosity that flows with the fluid.",
-    "vessel": "Not there: a free surface of the fluid, surfaces that turn, and walls that move "
-    "through it. Not with a fluid: several processes.",
+    "vessel": "Not there: a free surface of the fluid, surfaces that turn, and walls that move through it.",
     "wall": "Not there: the effect of a moving wall on the fluid; and wear.",
     "liquid": "Not there: several liquids, flow through bridges, and the mass of the liquid.",
     "spray": "Not there: flight of drops, which land at once, and their momentum.",

@@ -242,6 +242,11 @@ class CaseTables(Checked):
         return self.column.floor_area if not self.vessel else area_of_end(self.vessel, self.column, side)
 
     @property
+    def has_sticky_sides(self) -> bool:
+        """Whether the fluid sticks to the sides of the column, or to the vessel in it."""
+        return self.vessel is not None or "no_slip" in (self.column.sides, self.column.front or self.column.sides)
+
+    @property
     def line(self) -> Line:
         """Heights and radii of the round wall of the vessel or column, from the floor up [m]; empty in a box."""
         if self.vessel:

@@ -35,6 +35,10 @@ def read_text(path: Path) -> str:
 _DEEP = re.compile(rf"(?:[\w\"'-]{{1,64}}+[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}")
 
 
+_POWER = re.compile(r"[^=#]*=\s*([-+]?[.\d]+)\s*[xX*×]\s*10\s*(?:\^|\*\*)?\s*([-+]?\d+).*")
+"""A number such as 1.8x10-5, where 1.8e-5 is meant."""
+
+
 def parse(text: str, name: str) -> dict[str, Any]:
     """Values of a TOML text; errors call it `name`."""
     text = text.removeprefix("\ufeff")
@@ -59,7 +63,13 @@ def parse(text: str, name: str) -> dict[str, Any]:
         comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+(?:[eE][-+]?\d+)?)\s*(#.*)?", text.split("\n")[line - 1])
         remedy = f"; decimals have a point: {comma[1]}.{comma[2]}" if comma else ""
         unit = re.fullmatch(r"[^=#]*=\s*([-+]?[.\d]+(?:e[-+]?\d+)?)\s*[A-Za-z%µ°][^=]*", text.split("\n")[line - 1])
-        remedy += f"; numbers stand without a unit, in SI units: {unit[1]}" if unit else ""
+        power = _POWER.fullmatch(text.split("\n")[line - 1])
+        if power:
+            remedy += f"; powers of ten are written {power[1]}e{power[2]}"
+        else:
+            remedy += f"; numbers stand without a unit, in SI units: {unit[1]}" if unit else ""
+        if reason == r"Illegal character '\n'":
+            reason, where = "a string without its closing quotation mark", ""
         remedy += "; strings need quotation marks" if reason == "Invalid value" else ""
         raise InputError(place, None, "valid TOML", reason + where + remedy) from None
 

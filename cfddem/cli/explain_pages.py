@@ -69,6 +69,15 @@ def is_law(name: str) -> bool:
     return any(name in (law.name, f"{law.kind}.{law.name}") for those in laws().values() for law in those.values())
 
 
+def is_table(name: str) -> bool:
+    """Whether a case has a table of this name.
+
+    >>> is_table("fluid"), is_table("di_felice")
+    (True, False)
+    """
+    return bool(sections_of(Case.model_fields[name.lower()])) if name.lower() in Case.model_fields else False
+
+
 def containing(word: str) -> dict[str, dict[str, Law]]:
     """The laws whose name, first sentence or reference contains a word, by kind.
 

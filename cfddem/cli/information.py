@@ -46,7 +46,9 @@ def explain(
     import_laws(laws or ())
     by_kind, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
     if law is not None and not pages.is_law(law):
-        by_kind, keys = by_kind or pages.containing(law), pages.matching(law)
+        keys = pages.matching(law)
+        if not (by_kind or pages.is_table(law)):  # a table is shown alone, without the laws that mention its name
+            by_kind = pages.containing(law)
     require_folder(plot)
     several, chosen = bool(by_kind or keys), None
     if plot is not None and several:
@@ -61,7 +63,7 @@ def explain(
         listed = [pages.key_summary(*key_and_field) for key_and_field in keys.items()]
         print_json("explain", {"laws": every, "keys": listed, "not_there": " ".join(absent[1:])})
     else:
-        print("\n".join(pages.page(chosen) if chosen else [*pages.listing(by_kind), *pages.key_lines(keys), *absent]))
+        print("\n".join(pages.page(chosen) if chosen else [*pages.key_lines(keys), *absent, *pages.listing(by_kind)]))
     if plot is not None and chosen is not None:
         print(pages.plot(chosen, plot), file=sys.stderr if json else sys.stdout)
 

@@ -92,6 +92,7 @@ class SweepRun(TypedDict):
     measures: dict[str, Mean]
     seconds: float
     kept: bool
+    drifting: list[str]  # measures whose means are not stationary
 
 
 class SensitiveMeasure(TypedDict):

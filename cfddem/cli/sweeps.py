@@ -75,7 +75,7 @@ def sweep(
     from cfddem.case.gallery import find_case
     from cfddem.studies import sensitivity as of_keys
     from cfddem.studies.samples import chosen_values
-    from cfddem.studies.sweep import Outcome, failures
+    from cfddem.studies.sweep import Outcome, drifts, failures
     from cfddem.studies.sweep import sweep as run_all
 
     path, over, vary = find_case(case), values.over or [], values.vary or []
@@ -121,6 +121,8 @@ def sweep(
         print_json("sweep", {"folder": folder, "runs": runs_made, "sensitivity": sensitivity and sensitivity.summary()})
     else:
         print("\n".join([*(sensitivity.lines() if sensitivity else ()), f"table and figure written to {folder}"]))
+        if drift := drifts(outcomes):
+            print("\n".join(textwrap.wrap(f"cfddem: warning: {drift}", line_width())), file=sys.stderr)
     if failed:
         sys.exit(3)
 

@@ -193,6 +193,10 @@ class Evaporation(FeatureTable):
         """Tell the wet-bulb temperature, and what leaves no bond."""
         reason = f"the wet-bulb temperature is {self.wet_bulb(case):.2f} K at {case.reference_speed:g} m/s"
         yield "note", "evaporation", reason, "wet particles come to it while they dry at a constant rate"
+        radius = 0.5 * case.bed.largest_diameter
+        if self.full_thickness > radius:
+            reason = f"{self.full_thickness:g} m is more than the radius of a particle, {radius:.3g} m"
+            yield "error", "evaporation.full_thickness", reason, "films are of micrometres: 5e-6"
         if case.liquid and case.liquid.bond:
             reason = "bonds form between particles; films, and bridges at walls, leave nothing when they dry"
             yield "note", "liquid.bond", reason, "the solids of the liquid have no mass"

@@ -253,7 +253,9 @@ def _facts(case: Case) -> list[str]:
     lines.append("")
     for name, species in case.species.items():
         material = case.material_of(species)
-        lines.append(f"{case.counts[name]} spheres of {name}\nd = {species.diameter:.4g} m")
+        classes = [diameter for diameter, _ in species.sizes]
+        sizes = f"{min(classes):.3g} to {max(classes):.3g} m" if classes else f"{species.diameter:.4g} m"
+        lines.append(f"{case.counts[name]} spheres of {name}\nd = {sizes}")
         lines.append(f"{material.density:.4g} kg/m3, friction {material.friction:.3g}")
     if case.fluid is not None:
         lines += ["", f"fluid {case.fluid.density:.4g} kg/m3", f"viscosity {case.fluid.viscosity:.3g} Pa s"]

@@ -336,7 +336,7 @@ def wave_map(folder: str | Path, output: str | Path | None = None) -> Path:
 
 def draw_map(axes: Axes, layers: LayerMap, wave: Waves, window: tuple[float, float], title: str = "") -> None:
     """Solid fraction over time and height; a line shows the speed of the waves."""
-    top = 1e3 * float(layers.height[layers.solid_fraction.max(axis=0) > 0.02].max(initial=layers.height[0]))
+    top = 1e3 * float(layers.height[layers.solid_fraction.max(axis=0) > 0.02].max(initial=1.5 * layers.height[0]))
     shades = axes.pcolormesh(
         layers.time, 1e3 * layers.height, layers.solid_fraction.T, cmap="Blues", vmin=0.0,
         vmax=float(layers.solid_fraction.max()), shading="nearest", rasterized=True,

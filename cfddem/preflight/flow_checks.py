@@ -146,6 +146,13 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         yield Issue(
             "warning", "bed.inlet_velocity", f'unused, because column.ends is "{ends}"', 'set column.ends = "flow"'
         )
+    no_flow = ends == "flow" and case.fastest_inflow <= 0.0 and not any(e.pressure for e in case.patch.values())
+    stirred = case.drains or case.feed or case.outlet or any(wall.moves for wall in case.wall)
+    if no_flow and not stirred and case.bed.start in ("poured", "expanded") and not case.bed.fixed:
+        yield Issue(
+            "warning", "bed.inlet_velocity", "0 m/s, and no patch is an inlet: no fluid enters",
+            'give it, or a patch of kind = "inlet"; for a bed at rest set column.ends = "closed"',
+        )  # fmt: skip
     if ends == "periodic" and math.hypot(*case.laws.gravity) > 0.0:
         yield Issue(
             "warning", "column.ends", "periodic along gravity: particles and fluid accelerate without limit",

@@ -54,7 +54,12 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     limit = SUSPENDED_SOLID_FRACTION if start == "suspended" else POURED_SOLID_FRACTION
     remedy = f"at most {int(bed.count / fraction * limit)} of these particles fit; use fewer, or a higher column"
     count = bed_key(case, "count")
-    if start == "suspended" and fraction > SUSPENDED_SOLID_FRACTION:
+    if case.bed.height is not None and case.bed.height > column.height:
+        yield Issue(
+            "error", "bed.height", f"{case.bed.height:.3g} m is above the lid at {column.height:.3g} m",
+            "give both in m, or a higher column",
+        )  # fmt: skip
+    elif start == "suspended" and fraction > SUSPENDED_SOLID_FRACTION:
         yield Issue(
             "error", "bed.count",
             f"solid fraction {fraction:.2f} is above the limit {SUSPENDED_SOLID_FRACTION:.2f} of a suspended start",
@@ -335,8 +340,9 @@ def check_patches(case: Case) -> Iterator[Issue]:
             end = 0 if patch.side == "floor" else -1
             radius = f", a disc of {2.0 * case.line[end][1]:.3g} m" if case.line else ""
             yield Issue(
-                "error", f"patch.{name}", f"it lies outside of the {patch.side} of the column{radius}",
-                "move its centre [x, y], in m from the corner of the column",
+                "error", f"patch.{name}", f"it lies outside of the {patch.side} of the column{radius}"
+                + f"; its diameter is {patch.diameter or 0.0:g} m" * bool(patch.diameter),
+                "move its centre [x, y], in m from the corner of the column, and give its size in m",
             )  # fmt: skip
         elif share < MOSTLY and patch.shape != "whole":
             outside = "has no flow" if patch.mass_flow is None else "passes its part of mass_flow to the rest"

@@ -24,7 +24,7 @@ from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision, pair_row, reduced
 from cfddem.preflight.flow_checks import suggested_cell
-from cfddem.preflight.geometry_checks import fits
+from cfddem.preflight.geometry_checks import check_length, check_particle_size, fits
 from cfddem.preflight.issue import ORDER, Issue, Severity
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
@@ -149,6 +149,8 @@ def _preflight(case: Case, title: str) -> Preflight:
         remedy = suggested_cell(case) if key == "column.cell" else failure.remedy or "change it"
         return Preflight(title, (), (Issue("error", key, reason, remedy),))
     except (ArithmeticError, ValueError):
+        if not fits(case):  # a length in mm upsets the estimates
+            return Preflight(title, (), tuple(check_length(case, refused=True) or check_particle_size(case)))
         key, value = most_extreme(case)
         return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))
 

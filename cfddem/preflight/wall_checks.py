@@ -82,6 +82,12 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
             "set it to the speed of the tip, if that is the fastest",
         )  # fmt: skip
+    if wall in case.thin_walls and not _enters(wall, np.array(case.column.size)):
+        yield Issue(
+            "error", key, f"no part of the {wall.shape} lies in the column",
+            f"the column extends from 0 to {case.column.size} m; give all lengths in m",
+        )  # fmt: skip
+        return
     across = width / max(case.column.cell_edges)
     if wall.form.opening and wall in case.thin_walls and across < FEWEST_ACROSS:
         reason = f"{across:.2g} cells across the opening; its flow needs at least {FEWEST_ACROSS:g}"
@@ -99,6 +105,15 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "error", key, f"a {wall.shape} is not the same all along the periodic sides of the column",
             'set column.sides or column.front to "no_slip"; only planes and endless cylinders along them repeat',
         )  # fmt: skip
+
+
+def _enters(wall: CaseWall, column: np.ndarray) -> bool:
+    """Whether the box around some triangle of a wall reaches into a column of a size (3,) [m]."""
+    try:
+        corners = wall.form.corners()
+    except (InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
+        return True
+    return bool(((corners.min(axis=1) <= column) & (corners.max(axis=1) >= 0.0)).all(axis=1).any())
 
 
 def area_by_cells(case: Case, middle_x: float, middle_y: float, radius: float) -> float:

@@ -82,6 +82,11 @@ def measure(
     ...     return float(simulation.particles.position[:, 2].max())
     """
 
+    if callable(unit):
+        raise InputError(
+            "measure", getattr(unit, "__name__", ""), "declared with its unit", '@measure("m/s"), or @measure("1")'
+        )
+
     def declare(function: Function) -> Function:
         name = function.__name__
         quantity = of_function(function, unit, group)
@@ -89,7 +94,13 @@ def measure(
         def columns(case: Case) -> Mapping[str, Quantity]:
             return {name: quantity} if when(case) else {}
 
-        _declare(name, Measure(columns, lambda simulation: {name: float(function(simulation))}, shared))
+        def values(simulation: Simulation) -> Mapping[str, float]:
+            value = function(simulation)
+            if np.ndim(value):
+                raise InputError(f"measure {name}", np.shape(value), "one number", "take its mean, or one element")
+            return {name: float(value)}
+
+        _declare(name, Measure(columns, values, shared))
         return function
 
     return declare

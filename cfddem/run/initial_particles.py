@@ -60,7 +60,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     elif bed.species:
         places = _spread_evenly(case, properties, walls)
     else:
-        places = _suspended(len(diameters), float(diameters.max()), case, walls)
+        places = suspended_places(case, walls)
     places = in_the_box(places, case)
     particles = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
@@ -108,7 +108,7 @@ def expanded_height(case: Case) -> float:
 
 
 def _at_random(case: Case, diameters: Array) -> Array:
-    """A random packing of the column, or of an upright round vessel, up to the lid or the expected height (N, 3) [m]."""
+    """A random packing of a column or an upright round vessel, up to the lid or the expected height (N, 3) [m]."""
     width, depth, height = case.column.size
     if case.bed.start == "expanded":
         height = expanded_height(case)
@@ -124,9 +124,14 @@ def _at_random(case: Case, diameters: Array) -> Array:
     return places + 0.5 * np.array((width - across, depth - across, 0.0))
 
 
-def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) -> Array:
-    """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
-    column, seed = case.column, case.bed.seed
+def suspended_places(case: Case, walls: Sequence[Wall] = ()) -> Array:
+    """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m].
+
+    walls   of which those of the case keep places free
+    errors  InputError where the lattice has too little room
+    """
+    column, seed, diameters = case.column, case.bed.seed, particle_properties(case).diameter
+    count, largest = len(diameters), float(diameters.max())
     corner, size = case.bed.start_corner or (0.0, 0.0, 0.0), case.bed.start_size or column.size
     vessel = vessel_of(case) if case.vessel and not case.vessel.is_upright else None
     volume = case.floor_area * column.height if vessel is None else float(vessel.volumes[-1])
@@ -144,7 +149,8 @@ def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) ->
             return np.ascontiguousarray(places[np.sort(chosen)])
         pitch *= 0.99
     fraction = count * math.pi / 6.0 * largest**3 / volume
-    raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
+    limit = f"below what a lattice holds, whose places have room for the largest; a solid fraction of {fraction:.2f}"
+    raise InputError("bed.count", count, limit, 'use fewer, or bed.start = "poured"')
 
 
 def _must_be_apart(particles: Particles, walls: Sequence[Wall], of_column: int) -> None:

@@ -45,6 +45,9 @@ PUBLISHED = "voidage by "
 LONGEST_NAME = 120
 """Most characters of the name of a run; longer ones end in a number of their own."""
 
+MOST_NAMES = 3
+"""Measures that a message names."""
+
 MOST = 10_000
 """Largest number of runs."""
 
@@ -60,6 +63,7 @@ class Outcome:
     measures: dict[str, tuple[float, float, str]] = field(default_factory=dict)  # mean, error, unit
     seconds: float = 0.0
     kept: bool = False  # it was finished before this sweep
+    drifting: tuple[str, ...] = ()  # measures whose means are not stationary
 
     @property
     def name(self) -> str:
@@ -285,6 +289,7 @@ def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
         means = {name: (measure.mean, measure.error, measure.unit) for name, measure in result.measures.items()}
         if "rate" in result.impacts:
             means["collision_rate"] = (result.impacts["rate"], math.nan, "1/s")
+        values["drifting"] = tuple(name for name, measure in result.measures.items() if measure.stationary is False)
         laws = {row.law: (row.expected, math.nan, row.unit) for row in result.laws}
         values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
     return Outcome(**values)
@@ -324,6 +329,19 @@ def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measur
         sample_figure(points, path)
     else:
         sweep_figure(points, path, measured)
+
+
+def drifts(outcomes: Sequence[Outcome]) -> str:
+    """How many runs have means that still drift, and which, in one sentence; empty if none has."""
+    drifting = [outcome.drifting for outcome in outcomes if outcome.drifting]
+    names = list(dict.fromkeys(itertools.chain(*drifting)))
+    if not names:
+        return ""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return (
+        f"means still drift in {len(drifting)} of {len(outcomes)} runs: {', '.join(names[:MOST_NAMES])}{more}; "
+        "use a longer run.until, or a later run.average_from"
+    )
 
 
 def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:
