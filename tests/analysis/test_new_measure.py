@@ -95,3 +95,19 @@ def test_the_name_of_a_built_in_measure_is_refused() -> None:
 
     with pytest.raises(InputError, match="measure = 'bed_height': must be a new name"):
         measure("m")(bed_height)
+
+
+def test_a_measure_is_one_number_and_has_a_unit(tmp_path: Path) -> None:
+    @measure("m/s")
+    def rising(simulation):
+        """Velocities, which are many numbers."""
+        return simulation.particles.velocity[:, 2]
+
+    with pytest.raises(InputError, match=r"measure rising = \(\d+,\): must be one number"):
+        Run.begin(Case.from_text(SHORT), tmp_path / "run").go()
+    history.forget("rising")
+    with pytest.raises(InputError, match="measure = 'unitless': must be declared with its unit"):
+
+        @measure
+        def unitless(simulation):
+            return 1.0

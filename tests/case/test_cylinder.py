@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from test_coupling import suspension
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.particles.initial.packing import OVERLAP_LIMIT
 from cfddem.run.build import laws_of, materials_of, walls_of
-from cfddem.run.initial_particles import particles_of
+from cfddem.run.check import check
+from cfddem.run.initial_particles import expanded_height, particles_of
 from cfddem.run.simulation import Simulation
 
 WIDTH = 0.01
@@ -49,6 +52,42 @@ def test_what_enters_through_the_open_floor_leaves_through_the_lid(jet: dict) ->
     assert fast.any() == bool(jet)
 
 
-def test_a_random_packing_is_refused() -> None:
-    with pytest.raises(InputError, match=r'bed.start = .packed.*"poured" or "suspended" in a cylinder'):
-        cylinder(**{"bed.start": "packed"})
+@pytest.mark.parametrize(
+    ("start", "sizes", "vessel"),
+    [("expanded", [[0.8e-3, 0.4], [1.2e-3, 0.6]], None), ("packed", [], None), ("expanded", [], 0.8 * WIDTH)],
+    ids=["sizes", "packed", "vessel"],
+)
+def test_a_random_packing_fills_a_round_column(start: str, sizes: list, vessel: float | None) -> None:
+    """No sphere overlaps another or the wall, and the bed reaches up to the lid, or to its height in the flow."""
+    about = {"sizes": sizes} if sizes else {"diameter": 1e-3}
+    count = 1300 if start == "packed" else 500
+    round_wall = {"vessel": {"shape": "cylinder", "radius": 0.5 * vessel}, "column.shape": "box"} if vessel else {}
+    case = cylinder(bed={"count": count, "start": start, "inlet_velocity": 0.02} | about).with_(**round_wall)
+    spheres = particles_of(case, materials_of(case), walls_of(case), laws_of(case))
+    away = np.hypot(*(spheres.position[:, :2] - 0.5 * WIDTH).T) + spheres.radius
+    assert away.max() <= 0.5 * (vessel or WIDTH) * (1.0 + 1e-9)
+    near = cKDTree(spheres.position).query_pairs(2.0 * spheres.radius.max(), output_type="ndarray")
+    apart = np.linalg.norm(spheres.position[near[:, 0]] - spheres.position[near[:, 1]], axis=1)
+    assert (apart > (1.0 - 2.0 * OVERLAP_LIMIT) * spheres.radius[near].sum(axis=1)).all()
+    height = case.column.height if start == "packed" else expanded_height(case)
+    top = (spheres.position[:, 2] + spheres.radius).max()
+    assert top <= height * (1.0 + 1e-9)
+    assert top > 0.95 * height
+    middle = np.hypot(*(spheres.position[:, :2] - 0.5 * WIDTH).T) < 0.25 * (vessel or WIDTH)
+    assert spheres.volume[middle].sum() / spheres.volume.sum() == pytest.approx(0.25, abs=0.08)  # of the area
+
+
+def test_a_lattice_without_room_beside_a_round_wall_is_an_error_of_the_check() -> None:
+    """The check and the run refuse it with the same words."""
+    full = cylinder(**{"bed.count": 1150})
+    (issue,) = [issue for issue in check(full).issues if issue.severity == "error"]
+    assert issue.key == "bed.count"
+    assert "lattice" in issue.reason
+    with pytest.raises(InputError, match="lattice"):
+        particles_of(full, materials_of(full), walls_of(full), laws_of(full))
+
+
+def test_a_random_packing_fills_no_cone() -> None:
+    cone = {"shape": "cone", "radius": 2e-3, "length": 0.01}
+    with pytest.raises(InputError, match=r'bed.start = .packed.*"poured" or "suspended" in this vessel'):
+        cylinder(**{"bed.start": "packed", "column.shape": "box", "vessel": cone})

@@ -43,6 +43,7 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
     assert "exponent_richardson_zaki" in found and "wen_yu" not in found
     assert call("explain", "bed.inlet_velocity").out.startswith("bed.inlet_velocity = 0.0")
     assert call("explain", "sharp").out.startswith("laws.surface = ")  # a choice of a key
+    assert call("explain", "fluid").out.startswith("fluid.density") and "drag" not in call("explain", "fluid").out
     keys = call("explain", "bed").out
     assert "bed.diameter " in keys and "column.width" not in keys and max(map(len, keys.splitlines())) <= 100
     both = call("explain", "stokes")

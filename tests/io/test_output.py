@@ -260,6 +260,25 @@ def test_a_full_disk_gives_one_line_and_earlier_data_stay(small_disk):
     run.finish("failed", "the disk is full")  # a second failure does not hide the first
 
 
+@pytest.mark.skipif(os.name == "nt", reason="needs limits of processes")
+@pytest.mark.parametrize("room", [4_000, 20_000, 60_000])
+def test_a_limit_of_file_sizes_gives_one_line(tmp_path, room):
+    """A buffered file may fail as it seeks, too; HDF5 then ends the process unless the failure waits for its end."""
+    script = f"""
+import resource
+from pathlib import Path
+import numpy as np
+from cfddem.io.files import write_hdf5
+resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
+write_hdf5(Path("x.h5"), lambda file: [file.create_dataset(str(n), data=np.ones(1000)) for n in range(20)])
+"""
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "cannot write the file: file too large; raise the limit of file sizes" in done.stderr.split("\n")[-2]
+    assert "Exception ignored" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_read_only_folder_gives_one_line(small_disk):
     short_run(small_disk / "run").finish("stopped")
     subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)

@@ -101,3 +101,24 @@ def test_drag_beside_solid_cells_that_the_grid_counts_again_is_warned_of() -> No
     round_column = preflight(settling.with_(**{"column.shape": "cylinder"})).issues
     (issue,) = (each for each in round_column if each.key == "laws.wall_drag")
     assert issue.severity == "warning" and "up to 8 %" in issue.reason and "none" in issue.remedy
+
+
+# ---------------------------------------------------------------- lengths in mm, inlets that are missing
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value", "where", "said"),
+    [
+        ("wurster", "bed.diameter", 4.0, "bed.diameter", "did you mean 0.004 m"),
+        ("wurster", "bed.height", 40.0, "bed.height", "40 m is above the lid at 0.24 m"),
+        ("wurster", "wall.0.radius", 22.0, "wall.0", "no part of the cylinder lies in the column"),
+        ("wurster", "patch.jet.diameter", 32.0, "patch.jet", "its diameter is 32 m"),
+        ("wurster", "evaporation.full_thickness", 5.0, "evaporation.full_thickness", "more than the radius"),
+        ("gas-bed", "bed.inlet_velocity", 0.0, "bed.inlet_velocity", "no fluid enters"),
+    ],
+)
+def test_a_wrong_length_or_a_missing_inlet_is_told_at_its_key(
+    name: str, key: str, value: float, where: str, said: str
+) -> None:
+    told = [issue for issue in preflight(GALLERY[name].with_(**{key: value})).issues if issue.severity != "note"]
+    assert any(issue.key == where and said in issue.reason for issue in told), told

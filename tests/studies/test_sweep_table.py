@@ -9,7 +9,7 @@ import pytest
 
 import cfddem
 from cfddem.backend.errors import InputError
-from cfddem.studies.sweep import Outcome, write_table
+from cfddem.studies.sweep import Outcome, drifts, write_table
 
 pytest.importorskip("pandas", reason="needs `pip install 'cfddem[data]'`")
 
@@ -30,6 +30,15 @@ def test_a_table_has_means_errors_and_units(tmp_path: Path) -> None:
     units = runs.attrs["units"]
     assert units["bed.inlet_velocity"] == "m/s" and units["bed_height"] == units["bed_height_error"] == "m"
     assert units["bed_voidage"] == units["voidage by ergun"] == "-" and "laws.drag" not in units
+
+
+def test_a_sweep_says_which_means_still_drift() -> None:
+    steady = Outcome("s/a", {}, "finished")
+    moving = Outcome("s/b", {}, "finished", drifting=("bed_height", "pressure_drop", "wall_load", "contact_count"))
+    assert drifts([steady]) == ""
+    told = drifts([steady, moving])
+    assert told.startswith("means still drift in 1 of 2 runs: bed_height, pressure_drop, wall_load and 1 more; ")
+    assert moving.summary()["drifting"] == moving.drifting
 
 
 def test_a_folder_without_a_table_is_refused(tmp_path: Path) -> None:
