@@ -16,6 +16,9 @@ from cfddem.io.reading import RunData
 COLOUR, OPACITY, EDGE = "#6b6b6b", 0.18, "#3c3c3c"
 """Colour of a wall, its opacity, and the colour of its edges."""
 
+BEYOND = 1e-3
+"""Part of the space in view by which walls are drawn beyond it [-]."""
+
 SHARP = 25.0
 """Angle between two triangles from which their common edge is drawn [degrees]."""
 
@@ -50,10 +53,11 @@ def add_walls(plotter: Any, walls: Sequence[CaseWall], bounds: np.ndarray, time:
     time    [s]
     behind  function of a mesh that keeps the part behind a plane; all is drawn if None
     """
+    reach = bounds + np.ptp(bounds, axis=1)[:, None] * [-BEYOND, BEYOND]  # no seam where a round wall touches the sides
     for number, wall in enumerate(walls):
         mesh = (
             _moved(_surface(wall, bounds), wall, time)
-            .clip_box(bounds.ravel(), invert=False)
+            .clip_box(reach.ravel(), invert=False)
             .extract_surface(algorithm="dataset_surface")
         )
         mesh = mesh if behind is None or not mesh.n_points else behind(mesh)

@@ -83,7 +83,7 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ({"laws.added_mass": "zubr"}, "(did you mean 'zuber'?); cfddem explain lists all laws"),
         ({"laws.added_mass": -0.5}, "laws.added_mass = -0.5: must be zero or positive, or the name of a law"),
         ({"column.viscosity": 1e-3}, "viscosity belongs to fluid"),
-        ({"column.cell": [0.1, 0.2]}, "column.cell = [0.1, 0.2]: must be a number or a longer list"),
+        ({"column.cell": [0.1, 0.2]}, "column.cell = [0.1, 0.2]: must be a number or a list of at least 3 values"),
         ({"bed.inlet_velocity": [[1.0, 0.1], [0.5, 0.2]]}, "bed.inlet_velocity: must be a number, or [time, velocity]"),
         ({"bed.count": 10.5}, "bed.count = 10.5: must be a whole number"),
         ({"bed.diameter": float("inf")}, "bed.diameter = inf: must be a finite number"),
@@ -133,7 +133,7 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
         (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
         (b"", "must be given"),
     ],
-    ids=range(15),
+    ids=range(18),
 )
 def test_a_file_that_is_no_case_is_refused_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "bed.toml"
