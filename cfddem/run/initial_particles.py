@@ -114,7 +114,8 @@ def _at_random(case: Case, diameters: Array) -> Array:
         height = expanded_height(case)
     share = float((math.pi / 6.0 * diameters**3).sum()) / (case.floor_area * height)
     x, y, z = case.column.periodic
-    repeats = (x, y, z or case.bed.fixed)  # fixed particles are a slice of a longer bed
+    longer = case.bed.fixed and not case.vessel  # fixed particles are a slice of a longer bed; in a vessel it has ends
+    repeats = (x, y, z or longer)
     if not case.line:
         return random_packing(diameters, share, case.bed.seed, shape=(width, depth, height), periodic=repeats)[0]
     across = 2.0 * case.line[0][1]
