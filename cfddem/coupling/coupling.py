@@ -142,7 +142,9 @@ class Coupling:
         self.forces.act(terms)
         unseen = terms.unseen
         on_fluid = total(terms.on_fluid, unseen) if terms.on_fluid else None
-        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, unseen, on_fluid)
+        terms.implicit = self.momentum.prepare(
+            particles, cell_map, terms.resistance, step, unseen, on_fluid, terms.directions
+        )
         return terms
 
     def apply(self, particles: Particles, terms: CouplingTerms) -> None:

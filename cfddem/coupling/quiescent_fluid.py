@@ -138,7 +138,7 @@ class QuiescentFluid:
         force = total(terms.explicit, particles.external) + particles.external
         last_step = after_source(particles.velocity, force)
         implicit, target, _ = implicit_coefficients(
-            terms.resistance, terms.inertia, particles.velocity, terms.unseen, last_step, span
+            terms.resistance, terms.inertia, particles.velocity, terms.unseen, last_step, span, terms.directions
         )
         terms.receive(-implicit[:, None] * target)
         self.forces.finish(terms)

@@ -33,7 +33,7 @@ from cfddem.coupling.sampled_flow import Own
 from cfddem.coupling.seen_solids import cells_of
 from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
-from cfddem.coupling.self_disturbance_walls import OwnSolids, WallsOfGrid, at_shares, shares_in_cell
+from cfddem.coupling.self_disturbance_walls import OwnSolids, WallsOfGrid, at_shares, cell_of, shares_in_cell
 from cfddem.coupling.terms import CouplingTerms, total
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import Array
@@ -72,7 +72,7 @@ class SelfDisturbance(FluidForce):
         self._walls = [WallsOfGrid(kernel, fluid.boundaries, kind) for kind in kinds] if beside_walls else []
         smooth = beside_walls and bool(grid.walls)
         self._smooth = [WallsOfCells(kernel, kind) for kind in kinds] if smooth else []
-        self._cell = np.array(grid.whole.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
+        self._cell = cell_of(kernel)
         self._tables = [tables(kernel, kind) for kind in kinds]
 
     def own(self, particles: Particles, cell_map: ParticleCellMap) -> Own:

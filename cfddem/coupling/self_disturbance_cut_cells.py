@@ -1,14 +1,16 @@
 r"""What smooth walls, which cut cells, leave of the self-disturbance.
 
 The flow of a particle is driven in the cells on which it deposits, and gathered from these. Beside a cut wall they may
-lie at another distance from it than the particle: small cells are taken together with a larger one. So the shares are
-those of cells. A cell has the root of what a plane wall at the mean distance of its open part leaves of each mode,
-towards the wall and along it, and the normal of the wall. A particle gathers them as it gathers the fluid:
+lie at another distance from it than the particle: small cells are taken together with a larger one. So the flow is a
+sum over pairs of its cells. Of each pair it is what a plane wall across an axis of the grid leaves, at the mean
+distance of the open parts of both cells, weighted by the square of the normal n along this axis. Over what the particle
+would drive far from walls this is the share of each mode, r^2 towards the wall and along it:
 
-.. math:: u_k \to \left[r_t + (r_n - r_t)\,nn\right]\cdot u_k
+.. math:: u_k \to \left[r_t + nn\,(r_n - r_t)\right]\cdot u_k
 
-Between tabulated distances d the logarithm of a share, times d, is linear: the effect of a wall falls as 1/d. Nearer
-than half a cell a share falls as d. What a curved wall does beyond a plane one is left to the grid.
+Between cells at tabulated distances d, what the wall takes, times d, is linear: the effect of a wall falls as 1/d. The
+force on a cell at a wall is carried by the wall within the cell, and a slanting one has more of it: the flow along it
+is less by the largest component of n. What a curved wall does beyond a plane one is left to the grid.
 
 The solid fraction that a particle gathers of its own is a sum over pairs of its cells. What each cell gathers of itself
 and of its neighbours is found with the kernel of the run, between all walls, once.
@@ -17,21 +19,33 @@ and of its neighbours is found with the kernel of the run, between all walls, on
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.kernel_loops import gather, weight
-from cfddem.coupling.self_disturbance_tables import MODES, lattice_of
-from cfddem.coupling.self_disturbance_walls import PLACES, flow_beside
+from cfddem.coupling.kernel_loops import weight
+from cfddem.coupling.self_disturbance_tables import lattice_of, tables_of
+from cfddem.coupling.self_disturbance_walls import (
+    at_shares,
+    cell_of,
+    flow_beside,
+    normal_first,
+    shares_in_cell,
+)
 from cfddem.fluid.cut_cells import contents
 from cfddem.fluid.grid import Array
 from cfddem.fluid.surfaces import Surface
+from cfddem.particles.vectors import NOTHING, dot, of_row, plus, times
 
 LEAST = 1e-12
-"""Smallest share of a mode that counts [-]."""
+"""Smallest square of a normal that counts [-]."""
+
+AWAY = np.array([(0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.5, 4.5), (0.625, 1.0, 1.375, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)])
+"""Mean distances in cells for which the flow is tabulated, of cells in one layer along a wall and in two. The cells at
+the wall are half open, whole, or taken together with half a cell."""
 
 APART = 6
 """Distance in cells at which a cell no longer gathers from another one, at most."""
@@ -74,28 +88,29 @@ class WallsOfCells:
         centres = [np.ravel(coordinate) for coordinate in np.broadcast_arrays(*whole.centres())]
         distance = np.maximum(contents(whole.walls, whole.spacing, *centres)[1], 0.0)
         normal = _normals(whole.walls, centres, min(whole.spacing))
-        towards, along = np.zeros((2, MODES, distance.size))
-        axes = [axis for axis in range(3) if whole.cells[axis] > 1]
-        sloped = normal.any(axis=0)  # local: three components; not on the axis of a vessel, nor far from walls
-        for axis in axes:
-            roots = _roots(distance / whole.spacing[axis], flow_beside(axis, False, *lattice))
-            weight = np.where(sloped, normal[axis] ** 2, 1.0 / len(axes))
-            towards += weight * roots[:, axis]
-            along += weight * 0.5 * (roots.sum(axis=1) - roots[:, axis])  # local: three components
-        fields = np.concatenate([towards, along, normal]).reshape(-1, *whole.shape)
-        self._kernel, self._fields = kernel, ConstantFields(kernel, kernel.grid.part(fields))
+        number = kernel.of_large_cells(kernel.grid.part(np.indices(whole.shape, dtype=float)[::-1]))
+        fields = kernel.grid.part(np.concatenate([distance[None], normal]).reshape(-1, *whole.shape))
+        self._kernel, self._fields = kernel, ConstantFields(kernel, np.concatenate([number, fields]))
+        self._cell, self._periods = cell_of(kernel), periods_of(kernel)
+        self._axes = np.array(whole.cells) > 1
+        self._alone = tables_of(*lattice).flow
+        alone = [np.moveaxis(normal_first(self._alone, axis), 2, 0).swapaxes(1, 2) for axis in range(3)]
+        lost = []
+        for axis, far in enumerate(alone):
+            half, full, more = (flow_beside(axis, "smooth", *lattice, share) for share in (0.5, 1.0, 1.5))
+            in_layer = [half[0, 0], full[0, 0], more[0, 0], half[0, 1], full[0, 1], more[0, 1], *full[0, 2:]]
+            across = [half[1, 0], full[1, 0], more[1, 0], *full[1, 1:-1]]
+            lost.append([_lost(far[0], in_layer, AWAY[0]), _lost(far[1], across, AWAY[1])])
+        self._tables = np.stack(alone), np.array(lost)
 
     def left(self, position: Array, flow: Array) -> Array:
         """The modes of flows (N, MODES, 3) that particles at these places (N, 3) [m] drive or gather, beside walls."""
-        kernel, stencil = self._kernel, self._kernel.stencil(position, np.zeros(len(position)))
-        layered = self._fields.layered
-        values = np.empty((len(position), layered.shape[1]))
-        gather(*stencil, kernel.corners, layered, values)
-        towards, along, normal = values[:, :MODES], values[:, MODES : 2 * MODES], values[:, 2 * MODES :]
-        x, y, z = normal.T
-        normal = normal / np.sqrt(np.maximum(x * x + y * y + z * z, LEAST))[:, None]
-        through = sum(flow[:, :, d] * normal[:, None, d] for d in range(3))
-        left: Array = along[:, :, None] * flow + ((towards - along) * through)[:, :, None] * normal[:, None, :]
+        kernel, left = self._kernel, np.empty_like(flow)
+        stencil = kernel.stencil(position, np.zeros(len(position)))
+        pairs, normal = np.empty((len(position), 2, 16)), np.empty((len(position), 3))
+        at_wall = 0.5 * (AWAY[0, 2] + AWAY[0, 3]) * min(kernel.grid.spacing)
+        _sort_pairs(stencil, kernel.corners, self._fields.layered, self._periods, at_wall, pairs, normal)
+        _leave(position, (pairs, normal), self._cell, self._axes, (self._alone, *self._tables), flow, left)
         return left
 
 
@@ -112,8 +127,7 @@ class SolidsOfCells:
         place = kernel.of_large_cells(kernel.grid.part(numbers))
         exchanged = kernel.of_large_cells(_exchanged(kernel, passes, kind))
         self._kernel, self._fields = kernel, ConstantFields(kernel, np.concatenate([place, exchanged]))
-        counts = np.array(kernel.grid.whole.cells, float)
-        self._periods = np.where(kernel.periodic, counts, NEVER * counts)
+        self._periods = periods_of(kernel)
 
     def of(self, position: Array, volume: Array) -> Array:
         """Of particles at these places (N, 3) [m] with these volumes (N,) [m3]; (N,) [-]."""
@@ -136,17 +150,10 @@ def _normals(surface: Surface, centres: list[Array], spacing: float) -> Array:
     return normal
 
 
-def _roots(distance: Array, shares: Array) -> Array:
-    """Roots of the shares that a wall leaves at distances in cells (n,), of `flow_beside`; (MODES, 3, n)."""
-    shares = np.maximum(shares[PLACES // 2 :: PLACES], LEAST)  # at the centres of cells
-    at = np.arange(len(shares)) + 0.5
-    strength = -np.log(shares) * at[:, None, None]
-    away = np.maximum(distance, at[0])
-    row = np.clip((away - at[0]).astype(int), 0, len(at) - 2)
-    part = np.minimum(away - at[row], 1.0)[:, None, None]
-    lost = (strength[row] + part * (strength[row + 1] - strength[row])) / away[:, None, None]
-    roots = np.exp(-0.5 * lost) * np.sqrt(np.minimum(distance / at[0], 1.0))[:, None, None]
-    return np.moveaxis(roots, 0, -1)
+def periods_of(kernel: FilterKernel) -> Array:
+    """Cells after which x, y, z begin again (3,)."""
+    counts = np.array(kernel.grid.whole.cells, float)
+    return np.where(kernel.periodic, counts, NEVER * counts)
 
 
 def _exchanged(kernel: FilterKernel, passes: int, kind: int) -> Array:
@@ -203,3 +210,112 @@ def _pairs(stencil, corners, around, periods, volume, own):
                 z = _step(here[2], there[2], periods[2])
                 total += weight(i, a, b, c) * weight(j, a, b, c) * here[3 + 9 * (z + 1) + 3 * (y + 1) + x + 1]
         own[n] = volume[n] * total
+
+
+@threaded
+def _sort_pairs(stencil, corners, around, periods, at_wall, pairs, normal):
+    """Find the mean normal of the wall in the cells of each particle (N, 3), and the weights of pairs of these cells
+    and their mean distance from the wall [m], by how far they lie apart along z, y, x: first of those at the wall, then
+    of the others (N, 2, 16).
+
+    around   of cells: number along x, y, z of the large cell, distance and normal (cells, 7)
+    periods  cells after which x, y, z begin again (3,)
+    at_wall  largest distance of cells at the wall [m]
+    """
+    for n in prange(len(pairs)):
+        first, toward = stencil.first[n, 0], NOTHING
+        a, b, c = stencil.shares[n, 0, 0], stencil.shares[n, 0, 1], stencil.shares[n, 0, 2]
+        pairs[n] = 0.0
+        for i in range(8):
+            here, of_here = around[first + corners[i]], weight(i, a, b, c)
+            toward = plus(toward, times(of_here, (here[4], here[5], here[6])))
+            for j in range(8):
+                there, share = around[first + corners[j]], of_here * weight(j, a, b, c)
+                x, y = abs(_step(here[0], there[0], periods[0])), abs(_step(here[1], there[1], periods[1]))
+                away = 0.5 * (here[3] + there[3])
+                apart = 4 * abs(_step(here[2], there[2], periods[2])) + 2 * y + x + (8 if away > at_wall else 0)
+                pairs[n, 0, apart] += share
+                pairs[n, 1, apart] += share * away
+        for apart in range(16):
+            pairs[n, 1, apart] /= max(pairs[n, 0, apart], LEAST)
+        toward = times(1.0 / math.sqrt(max(dot(toward, toward), LEAST)), toward)
+        normal[n, 0], normal[n, 1], normal[n, 2] = toward
+
+
+def _lost(far: Array, beside: Sequence[Array], away: Array) -> Array:
+    """What a wall takes of the flow far from it, times the distance (distances, MODES, 3, 2, 2)."""
+    taken = [distance * (far - near) for distance, near in zip(away, beside)]
+    return np.stack(taken + taken[-1:] * (len(away) - len(taken)))
+
+
+@inline
+def _beside(axis, k, d, apart, away, tables):
+    """Flow along d of a mode in cells apart, beside a wall across an axis.
+
+    apart  4 z + 2 y + x by how far the cells lie apart
+    away   their mean distance in cells
+    """
+    (alone, lost), x, y, z = tables, apart & 1, (apart >> 1) & 1, apart >> 2
+    across, first, second = x if axis == 0 else (y if axis == 1 else z), y if axis == 0 else x, y if axis == 2 else z
+    distances, taken, row = AWAY[across], lost[axis, across], 0
+    while row < len(distances) - 2 and away > distances[row + 1]:
+        row += 1
+    inside = min(max(away, distances[0]), distances[-1])
+    part = (inside - distances[row]) / (distances[row + 1] - distances[row])
+    low, high = taken[row, k, d, first, second], taken[row + 1, k, d, first, second]
+    left = alone[axis, across, k, d, first, second] - (low + part * (high - low)) / max(away, distances[0])
+    return left * min(away / distances[0], 1.0)
+
+
+@threaded
+def _leave(position, around, cell, axes, tables, flow, left):
+    """Write what walls leave of the modes of every particle (N, MODES, 3).
+
+    around  pairs and normals, of `_sort_pairs`
+    axes    along which there are several cells
+    tables  flow far from walls, of `Tables`; the same and what walls take times the distance, of cells apart
+    """
+    for n in prange(len(position)):
+        _leave_one(n, position, around, cell, axes, tables, flow, left)
+
+
+@inline
+def _leave_one(n, position, around, cell, axes, tables, flow, left):
+    """`_leave` of one particle."""
+    (origin, inverse, linear), (of_free, alone, lost), (pairs, normals) = cell, tables, around
+    normal, count, through = of_row(normals, n), 0.0 + axes[0] + axes[1] + axes[2], 0.0
+    on_axis = dot(normal, normal) < 0.5  # where the distance has no slope
+    narrow = 1.0 if on_axis else max(abs(normal[0]), abs(normal[1]), abs(normal[2]))
+    shares = shares_in_cell(n, position, origin, inverse, linear)
+    for k in range(flow.shape[1]):
+        through = 0.0
+        for d in range(3):
+            towards, along, squares = 0.0, 0.0, LEAST
+            for axis in range(3):
+                square = axes[axis] / count if on_axis else normal[axis] ** 2
+                if axis == d:
+                    towards = _over_pairs(n, pairs, axis, k, d, inverse[axis], 1.0, (alone, lost))
+                elif square > LEAST:
+                    along += square * _over_pairs(n, pairs, axis, k, d, inverse[axis], narrow, (alone, lost))
+                    squares += square
+            free = max(at_shares(of_free[d, k], shares), 1e-300)
+            lengthwise = math.sqrt(max(along / (squares * free), 0.0))
+            left[n, k, d] = lengthwise * flow[n, k, d]
+            through += normal[d] * (math.sqrt(max(towards / free, 0.0)) - lengthwise) * flow[n, k, d]
+        for d in range(3):
+            left[n, k, d] += through * normal[d]
+
+
+@inline
+def _over_pairs(n, pairs, axis, k, d, inverse, narrow, tables):
+    """Flow of a particle along d in a mode, beside a wall across an axis.
+
+    narrow  part of the flow along the wall that its slant leaves in the cells at it
+    """
+    total = 0.0
+    for apart in range(16):
+        if pairs[n, 0, apart] > 0.0:
+            away = pairs[n, 1, apart] * inverse
+            slant = 1.0 - (1.0 - narrow) * min(max((AWAY[0, 3] - away) / (AWAY[0, 3] - AWAY[0, 2]), 0.0), 1.0)
+            total += pairs[n, 0, apart] * slant * _beside(axis, k, d, apart % 8, away, tables)
+    return total

@@ -22,10 +22,10 @@ import math
 from collections.abc import Iterator
 from functools import cache, lru_cache
 from itertools import product
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eig, eigh
 
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel
@@ -34,10 +34,18 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import Array
 
 PLACES = 4
-"""Tabulated distances from the wall within a cell."""
+"""Tabulated distances from the wall within a cell, of solids."""
 
 FARTHEST = 5
 """Last tabulated distance in cells; beyond it the effect of the wall falls as the inverse distance."""
+
+
+LAYERS = slice(PLACES // 2, None, PLACES)
+"""Centres of cells among the tabulated distances."""
+
+
+WallOf = Literal["side", "slips", "smooth"]
+"""A side of the grid, one along which the fluid slips, or a smooth wall, whose shear rate is of second order."""
 
 
 class _Side(NamedTuple):
@@ -58,15 +66,23 @@ class WallsOfGrid:
     """
 
     def __init__(self, kernel: FilterKernel, boundaries: Boundaries, kind: int = 0) -> None:
-        lattice = lattice_of(kernel, kind)
-        self._sides = [(side, flow_beside(side.axis, side.slips, *lattice)) for side in _sides(kernel, boundaries)]
+        lattice, self._cell = lattice_of(kernel, kind), cell_of(kernel)
+        self._sides = []
+        for side in _sides(kernel, boundaries):
+            alone = normal_first(tables_of(*lattice).flow, side.axis)
+            self._sides.append(
+                (
+                    side,
+                    (flow_beside(side.axis, "slips" if side.slips else "side", *lattice), np.ascontiguousarray(alone)),
+                )
+            )
 
     def left(self, position: Array) -> Array:
         """Root of the share of the modes of particles at these places (N, 3) [m] that the walls leave (N, MODES, 3)."""
-        left = np.ones((len(position), MODES * 3))
-        for side, shares in self._sides:
-            _leave(position, side.axis, side.place, side.inward, shares.reshape(len(shares), -1), left)
-        return np.sqrt(left).reshape(-1, MODES, 3)
+        left = np.ones((len(position), MODES, 3))
+        for side, flow in self._sides:
+            _leave_flow(position, side.axis, side.place, side.inward, flow, self._cell, left)
+        return np.sqrt(left)
 
 
 class OwnSolids:
@@ -80,11 +96,7 @@ class OwnSolids:
 
     def __init__(self, kernel: FilterKernel, passes: int, boundaries: Boundaries | None, kind: int = 0) -> None:
         lattice = lattice_of(kernel, kind, passes)
-        self._cell = (
-            np.array(kernel.grid.whole.origin),
-            1.0 / np.array(kernel.grid.spacing),
-            float(kernel.mapping == "linear"),
-        )
+        self._cell = cell_of(kernel)
         self._table, sides = solid_table(*lattice), [] if boundaries is None else _sides(kernel, boundaries)
         self._sides = [(side, solid_beside(side.axis, *lattice)) for side in sides]
 
@@ -106,6 +118,11 @@ def _sides(kernel: FilterKernel, boundaries: Boundaries) -> Iterator[_Side]:
             slips = bool((side.mirror > 0.0).all())  # local: likewise
             place = grid.origin[side.axis] + (grid.size[side.axis] if side.high else 0.0)
             yield _Side(side.axis, place, side.inward / grid.spacing[side.axis], slips)
+
+
+def cell_of(kernel: FilterKernel) -> tuple[Array, Array, float]:
+    """Origin and inverse spacing of the grid, and 1 for a linear mapping, 0 for another one."""
+    return np.array(kernel.grid.whole.origin), 1.0 / np.array(kernel.grid.spacing), float(kernel.mapping == "linear")
 
 
 @inline
@@ -148,18 +165,53 @@ def _leave(position, axis, place, inward, shares, left):
             left[n, m] *= 1.0 + (share - 1.0) / beyond
 
 
+@threaded
+def _leave_flow(position, axis, place, inward, flow, cell, left):
+    """Multiply the modes of every particle (N, MODES, 3) by the share that a wall leaves.
+
+    flow  of cells beside the wall, of `flow_beside`, and far from walls, `normal_first`
+    cell  of `cell_of`
+    """
+    (beside, alone), (origin, inverse, linear) = flow, cell
+    last = beside.shape[1] - 1
+    for n in prange(len(position)):
+        away = (position[n, axis] - place) * inward - 0.5
+        inside = min(max(away, 0.0), float(last))
+        row = min(int(inside), last - 1)
+        part, beyond = inside - row, max((away + 0.5) / (last + 0.5), 1.0)
+        x, y, z = shares_in_cell(n, position, origin, inverse, linear)
+        first, second = y if axis == 0 else x, y if axis == 2 else z
+        across = (x if axis == 0 else (y if axis == 1 else z)) if away < last else 0.0
+        for k in range(left.shape[1]):
+            for d in range(3):
+                flow_here = (1.0 - part) ** 2 * _along(beside[0, row, k, d], first, second)
+                flow_here += part**2 * _along(beside[0, row + 1, k, d], first, second)
+                flow_here += 2.0 * part * (1.0 - part) * _along(beside[1, row, k, d], first, second)
+                of_cells = (1.0 - across) * _along(alone[d, k, 0], first, second)
+                of_cells += across * _along(alone[d, k, 1], first, second)
+                left[n, k, d] *= 1.0 + (flow_here / of_cells - 1.0) / beyond
+
+
+@inline
+def _along(table, first, second):
+    """A table (2, 2) by distance along a wall, averaged with these shares of the neighbours."""
+    near = (1.0 - second) * table[0, 0] + second * table[0, 1]
+    return (1.0 - first) * near + first * ((1.0 - second) * table[1, 0] + second * table[1, 1])
+
+
 @lru_cache(maxsize=16)
 def solid_beside(axis: int, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
     """Own solid fraction beside a wall, by distance from it, over that far from walls (places,) [-]; see
     `flow_beside`."""
     order = _normal_first(axis)
     spaces, strengths = tuple(spacing[d] for d in order), tuple(strength[d] for d in order)
-    normal = _Normal(_cells_along(spaces)[0], spaces[0], True)
+    normal = _Normal(_cells_along(spaces)[0], spaces[0], "slips")
     solid = np.zeros(len(normal.weights))
     for _, squares, weight in _waves_along(spaces, math.prod(spacing)):
         modes = normal.smoothed(_left_across(squares, spaces, strengths), strengths[0], sweeps)
         solid += weight * (modes * normal.weights).sum(axis=1)  # local: of a table
-    return solid / _alone(solid_table(spacing, strength, sweeps), len(solid), axis)
+    shares: Array = solid / _alone(solid_table(spacing, strength, sweeps), len(solid), axis)
+    return shares[: PLACES * FARTHEST + 1]
 
 
 Three = tuple[float, ...]
@@ -196,13 +248,19 @@ def _waves_along(spaces: Three, volume: float) -> Iterator[tuple[list[float], li
 
 
 @lru_cache(maxsize=16)
-def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
-    """Shares of the self-disturbance that are left beside a wall, by distance from it (places, MODES, 3) [-].
+def flow_beside(
+    axis: int, wall: WallOf, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int, share: float = 1.0
+) -> Array:
+    """Flow by a force in one of the first cells from a wall, per force and times the viscosity (2, FARTHEST, MODES, 3,
+    2, 2) [1/m].
+
+    It is that of cells that lie 0 or 1 farther from the wall, and 0 or 1 apart along each of the other two axes.
 
     axis      of its normal
-    slips     whether the fluid slips along it
+    wall      how the fluid meets it
     spacing   of the cells [m]
     strength  of each sweep of the kernel's second stage along x, y, z
+    share     of the cells at a smooth wall that is open; above 1 if they are taken together with the next ones
     """
     order = _normal_first(axis)
     spaces, strengths = tuple(spacing[d] for d in order), tuple(strength[d] for d in order)
@@ -210,55 +268,69 @@ def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tu
         min((2.0 * math.sin(math.pi / n) / h) ** 2 for n, h in zip(_cells_along(spacing), spacing)),
         sum(4.0 / h**2 for h in spacing),
     )
-    driven = _driven_flow(slips, spaces, strengths, sweeps, math.prod(spacing), ends)
+    driven = _driven_flow((wall, share), spaces, strengths, sweeps, math.prod(spacing), ends)
     flow = np.empty_like(driven)
-    flow[:, :, order] = driven
-    alone = _alone(tables_of(spacing, strength, sweeps).flow, len(flow), axis)
-    shares: Array = flow / np.moveaxis(alone, 1, 2)
-    return shares
+    flow[:, :, :, order] = driven
+    return flow
+
+
+def normal_first(table: Array, axis: int) -> Array:
+    """A table (..., 2, 2, 2) by distance along z, y, x, by that along the normal of a wall and the other two axes."""
+    return np.moveaxis(table, [-1 - d for d in _normal_first(axis)], [-3, -2, -1])
 
 
 @lru_cache(maxsize=16)
 def _driven_flow(
-    slips: bool, spaces: Three, strengths: Three, sweeps: int, volume: float, ends: tuple[float, float]
+    wall: tuple[WallOf, float],
+    spaces: Three,
+    strengths: Three,
+    sweeps: int,
+    volume: float,
+    ends: tuple[float, float],
 ) -> Array:
-    """Flow that a force at a place drives there, normal to the wall and along it (places, MODES, 3).
+    """As `flow_beside`, with the normal of the wall as first direction. Of cubic cells it is the same for all walls.
 
-    Of cubic cells it is the same for all walls.
-
-    spaces, strengths  as of `flow_beside`, normal to the wall first
+    wall               and share, as of `flow_beside`
+    spaces, strengths  likewise, normal to the wall first
     volume             of a cell [m3]
     ends               least and largest rate over the viscosity [1/m2]
     """
-    normal = _Normal(_cells_along(spaces)[0], spaces[0], slips)
-    flow = np.zeros((len(normal.weights), MODES, 3))
+    normal = _Normal(_cells_along(spaces)[0], spaces[0], *wall)
+    flow = np.zeros((2, FARTHEST, MODES, 3, 2, 2))
 
     @cache
     def of_wave(square: float, smoothing: float) -> tuple[Array, ...]:
-        """Rates, and the flow normal to the wall and along it."""
-        modes = normal.smoothed(smoothing, strengths[0], sweeps)
-        rates, stream = normal.stokes(square)
-        return rates, math.sqrt(square) * modes @ normal.mean @ stream, modes @ normal.slope @ stream
+        """Rates, and the flow normal to the wall and along it, each gathered and driven."""
+        modes = normal.smoothed(smoothing, strengths[0], sweeps)[LAYERS]
+        (rates, stream, pushed), towards = normal.stokes(square), math.sqrt(square) * modes @ normal.mean
+        along = modes @ normal.slope
+        return rates, towards @ stream, pushed @ towards.T, along @ stream, pushed @ along.T
 
-    def add(d: int, driven: Array, rates: Array, weight: float) -> None:
-        """Add the flow of eigenvectors that a force along d drives (places, n) at rates over the viscosity (n,)."""
-        mode = mode_of(rates, *ends)
+    def add(d: int, gathered: Array, driven: Array, rates: Array, weight: Array) -> None:
+        """Add the flow of eigenvectors that a force along d drives (n, layers) at rates over the viscosity (n,)."""
+        mode, driven = mode_of(rates.real, *ends), driven.T
         for k in range(MODES):
-            flow[:, k, d] += weight * (driven[:, mode == k] ** 2 / rates[mode == k]).sum(axis=1)  # local: of a table
+            here, there, rate = gathered[:, mode == k], driven[:, mode == k], rates[mode == k]
+            pairs = here[:-1] * there[:-1], 0.5 * (here[:-1] * there[1:] + here[1:] * there[:-1])
+            for apart, pair in enumerate(pairs):
+                response = (pair / rate).sum(axis=1).real  # local: of a table
+                flow[apart, :, k, d] += np.multiply.outer(response, weight)
 
-    for waves, squares, weight in _waves_along(spaces, volume):
+    for waves, squares, count in _waves_along(spaces, volume):
+        weight = count * np.multiply.outer(*([1.0, math.cos(wave)] for wave in waves))
         square, smoothing = sum(squares), _left_across(squares, spaces, strengths)
-        modes = normal.smoothed(smoothing, strengths[0], sweeps)
+        modes = normal.smoothed(smoothing, strengths[0], sweeps)[LAYERS]
         if square > 0.0:
-            rates, towards, lengthwise = of_wave(square, smoothing)
-            add(0, towards, rates, weight)
+            rates, towards, pushed, lengthwise, pushed_along = of_wave(square, smoothing)
+            add(0, towards, pushed, rates, weight)
         for d, wave, along in zip((1, 2), waves, squares):
             share, staggered = along / square if square > 0.0 else 0.0, weight * math.cos(0.5 * wave) ** 2
             if square > 0.0:
-                add(d, lengthwise, rates, staggered * share)
-            apart = normal.rates + square
-            moving = apart > 1e-9 * ends[0]  # all but the fluid as a whole, over a wall without friction
-            add(d, (modes @ normal.vectors)[:, moving], apart[moving], staggered * (1.0 - share))
+                add(d, lengthwise, pushed_along, rates, staggered * share)
+            sliding, vectors, slid = normal.sliding
+            apart = sliding + square
+            moving = apart.real > 1e-9 * ends[0]  # all but the fluid as a whole, over a wall without friction
+            add(d, (modes @ vectors)[:, moving], (slid @ modes.T)[moving], apart[moving], staggered * (1.0 - share))
     return flow
 
 
@@ -266,29 +338,48 @@ def _alone(table: Array, places: int, axis: int) -> Array:
     """A table by distance between deposit and gather, far from a wall, at the tabulated distances from it."""
     place = np.arange(places) / PLACES - 0.5
     part = place - np.floor(place)
-    near, far = table[..., 0, 0, 0], np.moveaxis(table, -1 - axis, -3)[..., 1, 0, 0]
-    blend: Array = near + np.multiply.outer(2.0 * part * (1.0 - part), far - near)
+    near, far = normal_first(table, axis)[:, 0, 0]
+    blend: Array = near + 2.0 * part * (1.0 - part) * (far - near)
     return blend
+
+
+def _at_smooth_wall(share: float) -> tuple[Array, Array]:
+    """Shear rates at a smooth wall and on the far side of the cells at it, times the spacing: weights of the velocities
+    there and in the next cells. They are of a parabola with both means, see :mod:`cfddem.fluid.near_walls`.
+
+    share  of the cells at the wall that is open
+    """
+    distance = np.array([0.5 * share, share + 0.5])
+    depth = np.array([share**3, (share + 1.0) ** 3 - share**3]) / (3.0 * np.array([share, 1.0]) * distance)
+    curvature = np.array([1.0, -1.0]) / (distance * (depth[1] - depth[0]))
+    shear = np.array([1.0 / distance[0], 0.0]) + depth[0] * curvature
+    return shear, shear - 2.0 * share * curvature
 
 
 class _Normal:
     """Operators along the normal of a wall, from the wall up to a distant plane without friction.
 
     cells, spacing  along the normal
-    slips           whether the fluid slips along the wall
+    wall, share     as of `flow_beside`
     """
 
-    def __init__(self, cells: int, spacing: float, slips: bool) -> None:
+    def __init__(self, cells: int, spacing: float, wall: WallOf, share: float = 1.0) -> None:
         self.spacing = spacing
-        self.slope = (np.eye(cells, cells - 1) - np.eye(cells, cells - 1, -1)) / spacing  # faces to cells
+        slope = (np.eye(cells, cells - 1) - np.eye(cells, cells - 1, -1)) / spacing  # faces to cells
         self.mean = 0.5 * (np.eye(cells, cells - 1) + np.eye(cells, cells - 1, -1))
-        even = self.slope @ self.slope.T
-        self._along = even.copy()  # Laplacian of the velocity along the wall
-        self._along[0, 0] += 0.0 if slips else 2.0 / spacing**2
-        self._towards = self.slope.T @ self.slope
+        even = slope @ slope.T
+        self._along, self._towards = even.copy(), slope.T @ slope  # Laplacians of both velocities, times the volumes
+        self._along[0, 0] += 2.0 / spacing**2 if wall == "side" else 0.0
+        if wall == "smooth":
+            shear, beyond = _at_smooth_wall(share)
+            self._along[:2, :2] += np.array([shear - beyond - (1.0, -1.0), beyond - (-1.0, 1.0)]) / spacing**2
+            self._towards[0, 0] += (1.0 / share - 1.0) / spacing**2
+        self._cells, self._faces = np.eye(cells), np.eye(cells - 1)  # volumes
+        self._cells[0, 0], self._faces[0, 0] = share, 0.5 + 0.5 * share
+        self.slope = np.linalg.inv(self._cells) @ slope
         self._even_rates, self._even = np.linalg.eigh(even)
-        self.rates, self.vectors = np.linalg.eigh(self._along)
-        places = np.arange(PLACES * FARTHEST + 1)[:, None] / PLACES - 0.5
+        self.sliding = self._eigenvectors(self._along, self._cells)
+        places = np.arange(PLACES * (FARTHEST + 1))[:, None] / PLACES - 0.5
         self.weights = np.maximum(1.0 - np.abs(np.maximum(places, 0.0) - np.arange(cells)), 0.0)
 
     def smoothed(self, others: float, strength: float, sweeps: int) -> Array:
@@ -297,10 +388,18 @@ class _Normal:
         smoothed: Array = (self.weights @ self._even * factors) @ self._even.T
         return smoothed
 
-    def stokes(self, square: float) -> tuple[Array, Array]:
-        """Rates over the viscosity and stream functions of the flow with the wave number squared along the wall."""
-        identity = np.eye(len(self._towards))
-        mass = square * identity + self._towards
-        along = square * self._towards + self.slope.T @ self._along @ self.slope
-        rates, stream = eigh(square * (square * identity + self._towards) + along, mass)
-        return rates, stream
+    def _eigenvectors(self, matrix: Array, mass: Array) -> tuple[Array, Array, Array]:
+        """Rates, eigenvectors, and what forces drive of each; complex for smooth walls."""
+        if np.allclose(self._along, self._along.T, rtol=1e-12, atol=0.0):
+            rates, vectors = eigh(matrix, mass)
+            return rates, vectors, vectors.T
+        rates, vectors = eig(matrix, mass)
+        return rates, vectors, np.linalg.inv(mass @ vectors)
+
+    def stokes(self, square: float) -> tuple[Array, Array, Array]:
+        """Rates over the viscosity and stream functions of the flow with the wave number squared along the wall, and
+        what forces drive of each."""
+        mass = square * self._faces + self.slope.T @ self._cells @ self.slope
+        towards = square * (square * self._faces + self._towards)
+        along = self.slope.T @ (square * self._cells + self._along) @ self.slope
+        return self._eigenvectors(towards + along, mass)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.coupling.kernel import ParticleCellMap
+from cfddem.coupling.resistance_by_direction import Directions, implicit_force, slip_of
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.seen_solids import SeenSolids
 from cfddem.coupling.transfer import ImplicitCoefficients
@@ -34,9 +35,9 @@ class ForceTerms:
     A force adds its part of a line of `LINES`:
 
     resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid. It is stored as
-                that of the slip of the cells, b N
+                that of the slip of the cells, b N. Where the resistance depends on direction, b is the largest one,
+                and a tensor (N, 3, 3) is what it lacks of b
     fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the resistance of a line
-    turn        the rest of the force of a line, at the slip of the start of the step (N, 3) [N], through its resistance
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
@@ -48,24 +49,23 @@ class ForceTerms:
         self.particles, self.step, self.last_step = particles, step, last_step
         self.conductances: dict[str, Array] = {}
         self.fluctuations: dict[str, Array] = {}
-        self.rest: dict[str, Array] = {}  # of the force of a line, see `turn`
+        self.lacks: dict[str, Array] = {}  # what the resistance of a line lacks of its conductance, by direction
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
+        self.lacked: Array = np.zeros((0, 3))  # what the first of them lacks of that by its conductance, if anything
         self.added: Array = np.zeros(particles.count)  # change of the added mass at the start of the step (N,) [kg]
         self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
 
-    def resist(self, line: str, conductance: Array) -> None:
+    def resist(self, line: str, conductance: Array, lacks: Array | None = None) -> None:
         """Add a resistance to the slip of the particles."""
         _add(self.conductances, line, conductance * self.flow.narrowing)
+        if lacks is not None:
+            _add(self.lacks, line, lacks * np.reshape(self.flow.narrowing, (-1, 1, 1)))
 
     def fluctuate(self, line: str, velocity: Array) -> None:
         """Add a fluctuation of the fluid velocity that acts through the resistance of a line."""
         _add(self.fluctuations, line, velocity)
-
-    def turn(self, line: str, force: Array) -> None:
-        """Add the rest of the force of a line. It acts through the resistance of this line."""
-        _add(self.rest, line, force)
 
     def push(self, line: str, force: Array) -> None:
         """Add a force on the particles."""
@@ -85,14 +85,6 @@ class ForceTerms:
         return self.conductances[line] if line in self.conductances else np.zeros(self.particles.count)
 
     @property
-    def offsets(self) -> dict[str, Array]:
-        """Velocity that the resistance of a line adds to that of the cells (N, 3) [m/s]."""
-        offsets = dict(self.fluctuations)
-        for line, force in self.rest.items():
-            _add(offsets, line, force / np.maximum(self.conductance(line), 1e-300)[:, None])
-        return offsets
-
-    @property
     def resistance(self) -> Array:
         """Conductance b N of all lines (N,) [kg/s]."""
         return total(self.conductances, np.zeros(self.particles.count))
@@ -109,24 +101,39 @@ class ForceTerms:
         It is what the sampled flow lacks, less what the resistance of a line adds for itself alone.
         """
         unseen = self.flow.unseen
-        for line, velocity in self.offsets.items():
+        for line, velocity in self.fluctuations.items():
             share = self.conductance(line) / np.maximum(self.resistance, 1e-300)
             unseen = unseen - share[:, None] * velocity
         return unseen
 
-    def receive(self, force: Array) -> None:
-        """Divide the force of all resistance among its lines, by their conductances and offsets (N, 3) [N].
+    @property
+    def directions(self) -> Directions | None:
+        """How all resistance depends on direction; None if it does not."""
+        if not self.lacks:
+            return None
+        slip = self.flow.slip / np.reshape(self.flow.narrowing, (-1, 1)) + self.flow.unseen - self.unseen
+        return Directions(total(self.lacks, slip), slip)
 
-        The first line gets what the others leave.
+    def receive(self, force: Array) -> None:
+        """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].
+
+        The first line gets what the others leave; resistance that depends on direction is in no other.
         """
         of_slip, resistance = force, np.maximum(self.resistance, 1e-300)
-        for line, velocity in self.offsets.items():
+        if self.lacks:
+            of_slip = resistance[:, None] * slip_of(force, resistance, total(self.lacks, force))
+            self.lacked = of_slip - force
+        for line, velocity in self.fluctuations.items():
             of_slip = of_slip - self.conductance(line)[:, None] * velocity
         first, *others = [line for line in LINES if line in self.conductances] or ["drag"]
         self.implicit_force = {line: of_slip * (self.conductances[line] / resistance)[:, None] for line in others}
         for part in self.implicit_force.values():
             force = force - part
         self.implicit_force = {first: force} | self.implicit_force
+
+    def implicit_force_at(self, slip: Array) -> Array:
+        """Force of all resistance by a slip of the cells alone, over the step (N, 3) [N]."""
+        return implicit_force(slip, self.resistance, total(self.lacks, slip), self.inertia, self.step)
 
     def force(self, line: str) -> Array:
         """Force of a line on every particle (N, 3) [N]; zero for a line that the run lacks."""

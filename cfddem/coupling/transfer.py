@@ -36,6 +36,7 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, bind_arguments, specialise
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.resistance_by_direction import Directions, direct
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.fluid.grid import Array
 from cfddem.fluid.momentum import implicitness
@@ -98,17 +99,19 @@ class Transfer:
         step: float,
         disturbance: Array | None = None,
         source: Array | None = None,
+        directions: Directions | None = None,
     ) -> ImplicitCoefficients:
         """Coefficients of the coming step [s].
 
         conductance  b (N,)
         disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
         source       what every particle gives to the fluid beside (N, k); nothing if None
+        directions   how the resistance depends on direction; None if it does not
         """
         kernel, value = self.kernel, _columns(particles[self.value])
         disturbance = _or_zero(disturbance, value)
         implicit, target, carried = implicit_coefficients(
-            conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step
+            conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step, directions
         )
         if source is not None:
             carried = np.concatenate([carried, source], axis=1)
@@ -184,15 +187,24 @@ def _or_zero(values: Array | None, like: Array) -> Array:
 
 
 def implicit_coefficients(
-    conductance: Array, capacity: Array, value: Array, disturbance: Array, last: tuple[Array, Array, float], step: float
+    conductance: Array,
+    capacity: Array,
+    value: Array,
+    disturbance: Array,
+    last: tuple[Array, Array, float],
+    step: float,
+    directions: Directions | None = None,
 ) -> tuple[Array, Array, Array]:
     """b* (N,), v* (N, m), and what each particle deposits: b* and b* v* (N, 1 + m).
 
-    last  value before the last step (N, m), what the transfer gave in it (N, m), and its length [s]
+    last        value before the last step (N, m), what the transfer gave in it (N, m), and its length [s]
+    directions  how the resistance depends on direction; None if it does not
     """
     implicit, target = np.empty(len(value)), np.empty(value.shape)
     carried = np.empty((len(value), 1 + value.shape[1]))
     _implicit_coefficients(conductance, capacity, value, disturbance, last, step, (implicit, target, carried))
+    if directions is not None:
+        direct(directions, conductance, capacity, step, (value, disturbance), (implicit, target, carried))
     return implicit, target, carried
 
 

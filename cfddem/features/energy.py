@@ -348,7 +348,8 @@ class CouplingWork:
         """Work of drag and history force on the fluid, and of forces from outside."""
         kernel, fluid, received = self.coupling.kernel, self.coupling.fluid, particles.drag_impulse / terms.step
         cell_map, weight = terms.cell_map, np.moveaxis(fluid.drag_response()[0], -1, 0)
-        conductance = kernel.sample(cell_map.stencil, cell_map.radius, weight) * terms.implicit.implicit[:, None]
+        gathered = kernel.sample(cell_map.stencil, cell_map.radius, weight)
+        conductance = gathered * terms.implicit.implicit[:, None]
         acting = terms.implicit.target + received / np.maximum(conductance, 1e-300)
 
         def work(force: Array) -> float:
@@ -358,6 +359,8 @@ class CouplingWork:
         for line, velocity in terms.fluctuations.items():
             share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
             fluctuating = share[:, None] * conductance * velocity
+            if terms.lacks:
+                fluctuating = gathered * terms.implicit_force_at(share[:, None] * velocity)
         none = np.zeros_like(received)
         return ImplicitWork(
             work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),

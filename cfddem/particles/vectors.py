@@ -81,6 +81,21 @@ def cross(a, b):
 
 
 @inline
+def through(matrix, a):
+    """M a, with M as three rows"""
+    return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
+
+
+@inline
+def solved(matrix, b):
+    """x with M x = b, by Cramer's rule"""
+    first, second, third = matrix
+    along = cross(second, third)
+    whole = plus(plus(times(b[0], along), times(b[1], cross(third, first))), times(b[2], cross(first, second)))
+    return times(1.0 / dot(first, along), whole)
+
+
+@inline
 def across(a, normal):
     """The part of a that is perpendicular to a unit normal."""
     return minus(a, times(dot(a, normal), normal))

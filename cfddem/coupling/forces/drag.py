@@ -77,10 +77,13 @@ class Drag(FluidForce):
         """Put the pressure of the drag that a particle sees in the place of that of the drag in the cells around."""
         if self._kernel is None:
             return
-        kernel, flow, volume, force = self._kernel, terms.flow, terms.cell_map.volume, terms.implicit_force["drag"]
-        offset = terms.offsets.get("drag", np.empty((0, 3)))
+        kernel, flow, volume = self._kernel, terms.flow, terms.cell_map.volume
+        force = terms.implicit_force["drag"]
+        if terms.lacks:
+            force = force + terms.lacked
+        fluctuation = terms.fluctuations.get("drag", np.empty((0, 3)))
         drag, over_volume, rest = np.empty((3, *force.shape))
-        _drag_alone(force, terms.conductance("drag"), offset, self._alone, volume, drag, over_volume)
+        _drag_alone(force, terms.conductance("drag"), fluctuation, self._alone, volume, drag, over_volume)
         density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
         in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
         in_solids = terms.seen_solids.averaged(over_volume)
@@ -112,20 +115,20 @@ class Drag(FluidForce):
 
 
 @threaded
-def _drag_alone(force, conductance, offset, alone, volume, drag, over_volume):
+def _drag_alone(force, conductance, fluctuation, alone, volume, drag, over_volume):
     """Force of the drag law alone on every particle, and the same over its volume (N, 3) [N], [N/m3].
 
-    force        of the line of drag on the slip of the cells and its offset (N, 3) [N]
-    conductance  of this line (N,) [kg/s]
-    offset       what this line adds to the velocity of the cells (N, 3), or (0, 3) without any [m/s]
+    force        of the conductance on the slip of the cells and the fluctuation (N, 3) [N]
+    conductance  of the line of drag (N,) [kg/s]
+    fluctuation  of the velocity of the cells in this line (N, 3), or (0, 3) without any [m/s]
     alone        conductance of the drag law alone (N,) [kg/s]
     """
-    has_offset = len(offset) > 0
+    fluctuates = len(fluctuation) > 0
     for n in prange(len(drag)):
         for d in range(3):
             slip = force[n, d] / max(conductance[n], 1e-300)
-            if has_offset:
-                slip -= offset[n, d]
+            if fluctuates:
+                slip -= fluctuation[n, d]
             drag[n, d] = alone[n] * slip
             over_volume[n, d] = drag[n, d] / volume[n]
 

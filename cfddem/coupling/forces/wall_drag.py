@@ -6,10 +6,8 @@ over the nearest wall or all walls, with n the normal of the wall, less what the
 Every flat or round face is a wall: a capped cylinder has three. The sum over walls is an approximation. At finite Re it
 is added to the drag of the drag law: creeping flow near the wall, which is too much far from it.
 
-The transfer of momentum is implicit with one number per particle, a conductance c: that along the slip, but with the
-drag at least two thirds of the resistance b in any direction. The rest of the force acts through it, too, with the slip
-at the start of the step. So motion in that direction changes by the factor 1 - h b/m/(1 + theta lambda) in a step, with
-lambda = h c/m and theta of :mod:`cfddem.coupling.transfer`. It is above -1/2 in any step.
+It is implicit in every direction (:mod:`cfddem.coupling.resistance_by_direction`). In a step in which a film takes
+over, the drag towards the wall has the part R/h for as long as the film does not act.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from cfddem.coupling.terms import ForceTerms
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
-from cfddem.particles.vectors import NOTHING, dot, flat, minus, of_row, plus, times
+from cfddem.particles.vectors import dot, flat, of_row
 from cfddem.particles.walls.arrays import wall_arrays
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.nearest_point import nearest
@@ -41,8 +39,8 @@ CLOSEST = 1e-4
 class WallTerms(NamedTuple):
     """Extra drag beside walls."""
 
-    conductance: Array  # (N,) [kg/s]
-    force: Array  # the rest (N, 3) [N]
+    conductance: Array  # the largest in any direction (N,) [kg/s]
+    lacks: Array  # what the resistance lacks of it, by direction (N, 3, 3) [kg/s]
 
 
 class WallDrag(FluidForce):
@@ -66,26 +64,23 @@ class WallDrag(FluidForce):
         self._surfaces, self._options = (flat_walls.kind, flat_walls.shape), (which == "all", film, shear)
 
     def act(self, terms: ForceTerms) -> None:
-        """Resist the slip, and turn it."""
-        beside = self.terms(terms.particles, terms.flow.slip)
-        terms.resist("drag", beside.conductance)
-        terms.turn("drag", beside.force)
+        """Resist the slip, by direction."""
+        terms.resist("drag", *self.terms(terms.particles, terms.step))
 
-    def terms(self, particles: Particles, slip: Array) -> WallTerms:
-        """Extra drag at the slip u - v (N, 3) [m/s]."""
-        terms = WallTerms(np.empty(particles.count), np.empty((particles.count, 3)))
-        _beside(
-            particles.position, particles.radius, particles.viscosity, slip, self._surfaces, self._options, terms,
-        )  # fmt: skip
+    def terms(self, particles: Particles, step: float = 0.0) -> WallTerms:
+        """Extra resistance of every particle over a step [s]."""
+        terms, way = WallTerms(np.empty(particles.count), np.empty((particles.count, 3, 3))), step * particles.velocity
+        _beside(particles.position, particles.radius, particles.viscosity, way, self._surfaces, self._options, terms)
         return terms
 
 
 @inline
-def _factors(gap, film, shear):
-    """What a wall adds to the drag factor towards it and along it."""
-    across = towards_wall(gap) - 1.0
-    if not film or gap >= 1.0:
-        across += 1.0 / gap
+def _factors(gap, rise, film, shear):
+    """What a wall adds to the drag factor towards it and along it, over a step in which the gap rises so much."""
+    beyond = 1.0 if gap >= 1.0 else 0.0  # the share of the step in which no film acts
+    if rise != 0.0:
+        beyond = min(max((max(gap, gap + rise) - 1.0) / abs(rise), 0.0), 1.0)
+    across = towards_wall(gap) - 1.0 + (beyond if film else 1.0) / gap
     along = along_wall(gap) - 1.0
     if shear:
         along -= film_along_wall(gap)
@@ -93,34 +88,29 @@ def _factors(gap, film, shear):
 
 
 @inline
-def _force(normal, gap, slip, options):
-    """Extra force of a wall over Stokes' conductance, and the larger of its factors."""
-    across, along = _factors(gap, options[1], options[2])
-    return plus(times((across - along) * dot(normal, slip), normal), times(along, slip)), max(across, along)
-
-
-@inline
-def _beside_one(place, radius, viscosity, slip, surfaces, options, n, terms):
+def _beside_one(place, radius, viscosity, way, surfaces, options, n, terms):
     kind, shape = surfaces
-    force, largest, closest = NOTHING, 0.0, math.inf
+    stokes, closest = 6.0 * math.pi * viscosity * radius, math.inf
+    largest, lacks = 0.0, terms.lacks[n]
+    lacks[:] = 0.0
     for w in range(len(kind)):
         normal, distance, _, _, _, _ = nearest(kind, shape, w, place)
         gap = max(distance / radius - 1.0, CLOSEST)
         if not options[0] and gap >= closest:
             continue
         closest = gap
-        extra, factor = _force(normal, gap, slip, options)
-        force, largest = (plus(force, extra), largest + factor) if options[0] else (extra, factor)
-    stokes, square = 6.0 * math.pi * viscosity * radius, dot(slip, slip)
-    least = max((2.0 * largest - 1.0) / 3.0, 0.0)  # two thirds of all, of which Stokes' drag is 1
-    factor = max(dot(force, slip) / square, least) if square > 0.0 else least
-    terms.conductance[n] = stokes * factor
-    aside = times(stokes, minus(force, times(factor, slip)))
-    terms.force[n, 0], terms.force[n, 1], terms.force[n, 2] = aside
+        across, along = _factors(gap, dot(way, normal) / radius, options[1], options[2])
+        most = max(across, along)
+        largest = most + (largest if options[0] else 0.0)
+        for d in range(3):
+            for e in range(3):
+                lack = (most - along) * (d == e) + (along - across) * normal[d] * normal[e]
+                lacks[d, e] = stokes * lack + (lacks[d, e] if options[0] else 0.0)
+    terms.conductance[n] = stokes * largest
 
 
 @threaded
-def _beside(position, radius, viscosity, slip, surfaces, options, terms):
-    """Conductance and the rest of the force of every particle."""
+def _beside(position, radius, viscosity, way, surfaces, options, terms):
+    """Resistance of every particle on its way over a step [m]."""
     for n in prange(len(radius)):
-        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), surfaces, options, n, terms)
+        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(way, n), surfaces, options, n, terms)
