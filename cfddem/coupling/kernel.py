@@ -297,14 +297,16 @@ class FilterKernel:
 
     def _layers(self, *stencils: Stencil) -> slice:
         """The layers of cells that particles touch, among those of the grid and of the layer around it."""
+        if not stencils[0].first.size:
+            return slice(0, 0)
         ends = [int(end) for stencil in stencils for end in (stencil.first.min(), stencil.first.max())]  # local: own
         return slice(min(ends) // self._layer, max(ends) // self._layer + 2)
 
     def _planes_below(self, stencil: Stencil) -> slice:
         """The planes of the grid with all cells that take what particles deposit."""
-        if not stencil.first.size:
-            return slice(0, 0)
         layers = self._layers(stencil)
+        if layers.stop == 0:
+            return layers
         return slice(int(self._lowest_homes[layers].min()), int(self._highest_homes[layers].max()) + 1)  # local: own
 
     def _unit(self, cell_map: ParticleCellMap, values: Array) -> Array:
@@ -355,9 +357,7 @@ class FilterKernel:
         """
         layered = np.empty((len(self._homes.of_layered), len(fields)))
         around = self.reach.spread(self._merged.equalise(fields))
-        layers = slice(0, len(self._lowest_homes))
-        if stencils:
-            layers = self._layers(*stencils) if stencils[0].first.size else slice(0, 0)
+        layers = self._layers(*stencils) if stencils else slice(0, len(self._lowest_homes))
         ends = layers.start * self._layer, layers.stop * self._layer
         loops.spread(self._homes.of_layered, ends, around.reshape(len(fields), -1), layered)
         return layered
@@ -379,14 +379,18 @@ class FilterKernel:
         if sweeps == 0:
             return np.array(self._merged.equalise(fields), float, order="C")
         (now, inside), (other, inside_other) = self._scratch(len(fields))
-        inside[:] = fields = self._merged.equalise(fields)
+        fields = self._merged.equalise(fields)
         low, high = planes = self._planes(fields, sweeps)
-        other[:, :low] = other[:, high + 1 :] = 0.0
+        for padded in (now, other):  # beside the planes that are swept
+            padded[:, low - 1] = padded[:, high + 1] = 0.0
+        swept, smoothed = np.s_[:, low - 1 : high], np.zeros(fields.shape)
+        inside[swept] = fields[swept]
         for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
             loops.sweep(now, other, planes, strength, *self._gates, self._merged.shares)
             now, inside, other, inside_other = other, inside_other, now, inside
-        return self._merged.copy(np.array(inside, order="C"))
+        smoothed[swept] = inside[swept]
+        return self._merged.copy(smoothed)
 
     def _planes(self, fields: Array, sweeps: int) -> tuple[int, int]:
         """First and last plane, of padded fields, that so many sweeps reach: all of a grid that others go on."""

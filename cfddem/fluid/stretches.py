@@ -25,7 +25,7 @@ class Stretches(NamedTuple):
     def over(cls, wanted: Any) -> Stretches:
         """The stretches that have all wanted places of a padded field (nz, ny, nx)."""
         at, size = np.flatnonzero(wanted), wanted[0].size
-        apart, planes = np.diff(at, prepend=-WORTH - 1), np.diff(at // size, prepend=-1)
+        apart, planes = np.diff(at, prepend=0), np.diff(at // size, prepend=-1)
         begins = np.flatnonzero((apart > WORTH) | (planes > 0))
         ends = np.append(begins, at.size)[1:] - 1
         first = np.searchsorted(at[begins], np.arange(len(wanted) + 1) * size)

@@ -182,9 +182,8 @@ def _of_first(
     shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(z))
     velocities = [wall.velocity(x, y, z) for wall in walls]
     lowest, velocity = np.full(shape, np.inf), [np.zeros(shape) for _ in range(3)]
-    if not any(component.any() for components in velocities for component in components):
-        walls = ()  # all are at rest, whichever is first
-    for wall, components in zip(walls, velocities):
+    moving = any(component.any() for components in velocities for component in components)
+    for wall, components in zip(walls, velocities) if moving else ():  # at rest, it does not matter which is first
         ranked = rank(wall)
         for d, component in enumerate(components):
             velocity[d] = np.where(ranked < lowest, component, velocity[d])

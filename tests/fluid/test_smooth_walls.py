@@ -13,8 +13,9 @@ from cfddem.backend.errors import InputError
 from cfddem.fluid.budgets import continuity_residual
 from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.cut_cells import contents, volumes, within
-from cfddem.fluid.grid import Grid
+from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.near_walls import NoWalls
+from cfddem.fluid.pressure import multigrid
 from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import Plane, Surface, cylinder, together, turned
 from cfddem.fluid.wall_force import force_on_walls
@@ -180,6 +181,23 @@ def iterations(grid: Grid) -> float:
 def test_the_pressure_needs_few_more_iterations_than_in_the_box():
     grid = Grid((12, 12, 24), (1.0 / 12,) * 3)
     assert iterations(within(grid, cylinder((0.51, 0.49, 0.0), 0.47))) < iterations(grid) + 3.0
+
+
+def test_sweeps_that_go_too_far_save_iterations_between_smooth_walls(monkeypatch):
+    """The flow is that of sweeps that balance each cell, up to the tolerance."""
+    grid = within(Grid((12, 12, 24), (1.0 / 12,) * 3), cylinder((0.51, 0.49, 0.0), 0.47))
+
+    def flow() -> tuple[float, Array]:
+        fluid = FluidSolver(grid, THROUGH, density=1.0, viscosity=1e-3)
+        reports = [fluid.step(0.02) for _ in range(20)]
+        assert not fluid.pressure[~grid.open].any()
+        return sum(sum(report.pressure_iterations) for report in reports), fluid.velocity
+
+    over_relaxed, velocity = flow()
+    monkeypatch.setattr(multigrid, "OVER", 1.0)
+    balanced, same = flow()
+    assert over_relaxed < 0.95 * balanced
+    np.testing.assert_allclose(velocity, same, rtol=0.0, atol=1e-7)
 
 
 def test_a_box_has_nothing_of_smooth_walls():

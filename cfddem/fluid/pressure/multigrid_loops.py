@@ -55,9 +55,9 @@ def _coarsen_plane(kc, fine, factors, farther, coupled, coarse):
 
 
 @threaded
-def take_diagonal(ax, ay, az, anchor, diagonal, inverse, wet):
-    """Diagonal of L and its inverse, zero in solid cells; and of each plane the first row that has other ones, and the
-    one after the last (nz, 2)."""
+def take_diagonal(ax, ay, az, anchor, relaxation, diagonal, inverse, wet):
+    """Diagonal of L, and the relaxation of sweeps over it, zero in solid cells; and of each plane the first row that
+    has other ones, and the one after the last (nz, 2)."""
     nz, ny, nx = ax.shape
     for k in prange(nz):
         above = neighbours(k, nz)[1]
@@ -69,17 +69,23 @@ def take_diagonal(ax, ay, az, anchor, diagonal, inverse, wet):
                 total = ax[k, j, i] + ay[k, j, i] + az[k, j, i] + anchor[k, j, i]
                 total = total + ax[k, j, right] + ay[k, back, i] + az[above, j, i]
                 diagonal[k, j, i] = total
-                inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
+                inverse[k, j, i] = relaxation / total if total > 0.0 else 0.0
             for i in range(nx):
                 if diagonal[k, j, i] > 0.0:
                     wet[k, 0], wet[k, 1] = min(wet[k, 0], j), j + 1
                     break
 
 
+@inline
+def _kept(kept, before, invert, balanced):
+    """A value after relaxation, which keeps a part of the one before: nothing in a solid cell, so that zero stays."""
+    return balanced + (kept * before if invert > 0.0 else 0.0)
+
+
 @vector_inline
 def _relax_plane(k, colour, backward, x, b, matrix, new):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
-    ax, ay, az, inverse, wet = matrix
+    ax, ay, az, inverse, wet, kept = matrix
     nz, ny, nx = x.shape
     below, above = neighbours(k, nz)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
@@ -94,22 +100,32 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
             new[i] = (rhs[i] + a_south[i] * south[i] + a_north[i] * north[i]) + (a_down[i] * down[i] + a_up[i] * up[i])
         for i in range(1, nx - 1):
             new[i] = (new[i] + west[i] * here[i - 1] + west[i + 1] * here[i + 1]) * invert[i]
+        if kept != 0.0:
+            _keep(kept, here, invert, new)
         parity = (k + j + colour) & 1
         # The ends of a row can be neighbours across a periodic boundary: one after the other.
         for count_end in range(min(2, nx)):
             i = nx - 1 if (count_end == 1) != backward else 0
             if (i & 1) == parity:
                 left, right = neighbours(i, nx)
-                here[i] = (new[i] + west[i] * here[left] + west[right] * here[right]) * invert[i]
+                new[i] = (new[i] + west[i] * here[left] + west[right] * here[right]) * invert[i]
+                here[i] = new[i] if kept == 0.0 else _kept(kept, here[i], invert[i], new[i])
         for i in range(1, nx - 1):
             here[i] = new[i] if (i & 1) == parity else here[i]
+
+
+@vector_inline
+def _keep(kept, here, invert, new):
+    """Add what relaxation keeps of the values inside a row."""
+    for i in range(1, new.size - 1):
+        new[i] = _kept(kept, here[i], invert[i], new[i])
 
 
 @threaded
 def smooth(x, b, matrix, rows, first, halves, backward):
     """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten.
 
-    matrix  coefficients along x, y, z, the inverse of the diagonal, and the wet rows
+    matrix  coefficients along x, y, z, relaxation over the diagonal, wet rows, and what relaxation keeps of a value
     first   colour of the first half of a sweep
     halves  number of halves, of both colours in turn
     """

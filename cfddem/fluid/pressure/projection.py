@@ -13,13 +13,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import inline, prange, threaded, vector_inline
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.fields import CellFields
-from cfddem.fluid.grid import LOW, UNIT, Array
+from cfddem.fluid.grid import LOW, UNIT, Array, Grid
 from cfddem.fluid.momentum import line, strides
 from cfddem.fluid.pressure.ranks import pressure_equation
 from cfddem.fluid.pressure.regions import ClosedRegions
@@ -42,7 +43,7 @@ class Projection:
         self._stretches = stretches
         closed_regions = ClosedRegions.of(grid, boundaries, communicator)
         self._equation = pressure_equation(grid, closed_regions, communicator, boundaries.periodic, boundaries.outlets)
-        self._open, self._wet = grid.open.astype(float), grid.open.any(axis=2)  # local: rows of this rank
+        self._open, self._wet = grid.open.astype(float), _wet_rows(grid)
         self._areas = np.array([grid.face_area(d) for d in range(3)])
         self._inverse = 1.0 / np.array(grid.spacing)
         self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
@@ -79,13 +80,20 @@ class Projection:
         return iterations
 
 
+def _wet_rows(grid: Grid) -> NDArray[np.int64]:
+    """First row of each plane that has open cells, and the one after the last (nz, 2)."""
+    wet: Any = grid.open.any(axis=2)  # local: rows of this rank
+    end = wet.shape[1] - wet[:, ::-1].argmax(axis=1)  # local: rows of a plane
+    return np.stack([wet.argmax(axis=1), end * wet.any(axis=1)], axis=1)  # local: a plane
+
+
 class Flow(NamedTuple):
     """What the pressure equation is made of.
 
     velocity, mobility  padded faces
     voidage, rate       padded cells; rate is d eps/dt [1/s]
     open_cells          (nz, ny, nx) 1 where open
-    wet                 (nz, ny) whether a row has open cells
+    wet                 (nz, 2) first row of each plane that has open cells, and the one after the last
     ends                (3, 2) where the box ends below and above along x, y, z
     areas, inverse      of faces normal to x, y, z [m2], and 1/spacing [1/m]
     """
@@ -147,9 +155,7 @@ def assemble(flow, shares, fresh, equation):
     ax, ay, az, anchor, b = equation
     nz, ny, nx = flow.open_cells.shape
     for k in prange(nz):
-        for j in range(ny):
-            if not flow.wet[k, j]:
-                continue
+        for j in range(flow.wet[k, 0], flow.wet[k, 1]):
             row = k + LOW, j + LOW, LOW
             balance_row(flow, shares, row, flow.open_cells[k, j], b[k, j])
             if fresh:
