@@ -243,8 +243,9 @@ class CaseTables(Checked):
 
     @property
     def has_sticky_sides(self) -> bool:
-        """Whether the fluid sticks to the sides of the column, or to the vessel in it."""
-        return self.vessel is not None or "no_slip" in (self.column.sides, self.column.front or self.column.sides)
+        """Whether the fluid sticks to the sides of the column, as to any round wall, or to the vessel in it."""
+        sides = self.column.sides, self.column.front or self.column.sides
+        return self.vessel is not None or self.column.shape == "cylinder" or "no_slip" in sides
 
     @property
     def line(self) -> Line:

@@ -71,9 +71,9 @@ def within(grid: Grid, surface: Surface) -> Grid:
 @lru_cache(maxsize=8)
 def open_share(grid: Grid) -> Array | NDArray[np.bool_]:
     """Share of every cell that holds fluid (nz, ny, nx); kept, as measures ask for it in every row."""
-    if not grid.walls:
-        return grid.open
-    share = np.asarray(volumes(grid.walls, grid.spacing, *_full_centres(grid)) * grid.open)
+    share = np.array(grid.open)
+    if grid.walls:
+        share = np.asarray(volumes(grid.walls, grid.spacing, *_full_centres(grid)) * grid.open)
     share.flags.writeable = False
     return share
 

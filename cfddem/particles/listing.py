@@ -1,4 +1,7 @@
-"""The neighbour lists of a run, one after the other: sorting of rows, width of the skin, memory of pairs."""
+"""The neighbour lists of a run, one after the other: sorting of rows, width of the skin, memory of pairs.
+
+Also the state of particles and pairs by ids, from which lists are made again.
+"""
 
 from __future__ import annotations
 

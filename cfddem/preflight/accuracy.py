@@ -35,7 +35,7 @@ GAS_BY_KERNEL = ((1.0, 1.033), (1.5, 1.0), (2.0, 0.944))
 
 OF_KERNEL = {
     True: ("granular temperature", BY_KERNEL, "glass beads, with smeared surfaces"),
-    False: ("bed height", GAS_BY_KERNEL, "small gas bed"),
+    False: ("bed height", GAS_BY_KERNEL, "small gas bed, with sharp surfaces"),
 }
 """What changes with the kernel, and the bed that it was measured in: in a liquid, or in a gas."""
 

@@ -37,7 +37,8 @@ SOFT_OVERLAP, NOTED_OVERLAP, LARGEST_OVERLAP = 0.02, 0.04, 0.1
 
 Between the first two it is a note where only the fastest collisions overlap so far, or the flow carries the bed.
 Contacts four times stiffer change mean height and pressure drop of a slugging bed (gallery case `defluidisation`) by
-+2.2 and -0.6 %, with errors of 2.1 and 0.9 % (`cfddem validate beds`).
++2.2 and -0.6 %, with errors of 2.1 and 0.9 %, and the deviation of the pressure by +28 %, with an error of 10 %
+(`cfddem validate beds`).
 """
 
 LONG_STEP = 2.0
@@ -121,7 +122,7 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
     if case.is_one_sphere and severity == "warning":
         severity, effect = "note", "a single particle meets walls only"
     elif part <= NOTED_OVERLAP and not presses:
-        severity, effect = "note", "overlaps of 2 to 4 % change mean heights by up to about 2 %"
+        severity, effect = "note", "overlaps of 2 to 4 % change mean heights by about 2 %, fluctuations by more"
         if cause == "the weight of the bed":
             effect = "the flow carries this weight"
     key, remedy = "laws.contact_parameters", f"choose stiffer parameters of the contact law {law.name}"

@@ -140,6 +140,8 @@ def _preflight(case: Case, title: str) -> Preflight:
         steps = estimate_steps(case, bed)
         cost = estimate_cost(case, bed, steps)
         issues = find_issues(case, bed, collision, wet, steps, cost)
+        if case.bed.height is not None and case.bed.height > case.column.height:  # its weight and count mean nothing
+            return Preflight(title, (), tuple(issue for issue in issues if issue.key == "bed.height"))
         issues = sorted([*issues, *own], key=lambda issue: ORDER.index(issue.severity))
         rows = overview(case, bed, collision, wet, steps, cost) if fits(case) else ()  # else they mean nothing
         return Preflight(title, rows, tuple(issues))

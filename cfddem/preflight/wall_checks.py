@@ -66,8 +66,11 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         yield from issues
         if any(issue.severity == "error" for issue in issues):
             return
-    for severity, word, reason, remedy in wall.form.misplaced(np.array(case.column.size)):
-        yield Issue(severity, f"{key}.{word}", reason, remedy)
+    misplaced = [
+        Issue(severity, f"{key}.{word}", reason, remedy)
+        for severity, word, reason, remedy in wall.form.misplaced(np.array(case.column.size))
+    ]
+    yield from misplaced
     narrow, width = wall.form.opening or ("", 0.0)
     if wall.solid != "inside" and 0.0 < width < case.bed.largest_diameter:
         yield Issue(
@@ -82,7 +85,7 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
             "set it to the speed of the tip, if that is the fastest",
         )  # fmt: skip
-    if wall in case.thin_walls and not _enters(wall, np.array(case.column.size)):
+    if not misplaced and wall in case.thin_walls and not _enters(wall, np.array(case.column.size)):
         yield Issue(
             "error", key, f"no part of the {wall.shape} lies in the column",
             f"the column extends from 0 to {case.column.size} m; give all lengths in m",

@@ -30,7 +30,7 @@ def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> P
     """
     result = preflight(case)
     if case.compare:
-        from cfddem.run.history import units_of  # loads the compiler, which other checks lack
+        from cfddem.run.history import units_of  # loads the compiler, which checks of plain columns lack
 
         result = result.with_errors(check_quantities(case, units_of(case)))
     if result.status != "error":

@@ -1,4 +1,4 @@
-"""How a case is divided among ranks: cells and particles by the same planes, or particles alone."""
+"""How a case is divided among ranks, and what its check says of that: by the same planes, or particles alone."""
 
 from __future__ import annotations
 

@@ -14,18 +14,22 @@ from scipy.sparse.linalg import spsolve
 from cfddem.backend.communicator import SERIAL
 from cfddem.fluid import budgets
 from cfddem.fluid.grid import Grid, outside_cylinder
-from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.fluid.pressure.multigrid import OVER_RELAXATION, PressureEquation
 from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.solver import FluidSolver
 
 
-def equation(cells, spacing=(1.0, 1.0, 1.0), periodic=(False, False, False), anchored=True, solid=False, seed=0):
+def equation(
+    cells, spacing=(1.0, 1.0, 1.0), periodic=(False, False, False), anchored=True, solid=False, seed=0, relaxation=1.0,
+):  # fmt: skip
     """A pressure equation with random coefficients of contrast 30, its solid mask and its right-hand side."""
     rng = np.random.default_rng(seed)
     grid = Grid(cells, spacing)
     if solid:
         grid = grid.with_solid(outside_cylinder((cells[0] / 2, cells[1] / 2, 0), 0.45 * cells[0]))
     system = PressureEquation(grid, None if anchored else ClosedRegions.numbered(grid.open.astype(np.int64), SERIAL))
+    for level in system.levels:
+        level.relaxation = relaxation
     finest = system.finest
     for d, a in enumerate((finest.ax, finest.ay, finest.az)):
         a[:] = rng.uniform(0.1, 3.0, grid.shape) * grid.face_area(d) / spacing[d]
@@ -63,8 +67,15 @@ CASES = {
     "one cell thick": {"cells": (16, 1, 12)},
     "flat cells": {"cells": (12, 12, 12), "spacing": (1.0, 1.0, 4.0)},
     "cylinder": {"cells": (14, 14, 16), "solid": True},
+    "over-relaxed cylinder": {"cells": (14, 14, 16), "solid": True, "relaxation": OVER_RELAXATION},
     "closed": {"cells": (12, 8, 20), "anchored": False},
     "periodic": {"cells": (12, 8, 20), "anchored": False, "periodic": (True, True, True)},
+    "over-relaxed odd periodic": {
+        "cells": (11, 9, 15),
+        "anchored": False,
+        "periodic": (True, True, True),
+        "relaxation": OVER_RELAXATION,
+    },  # fmt: skip
     "odd periodic": {"cells": (11, 9, 15), "anchored": False, "periodic": (True, True, True)},
     "closed cylinder": {"cells": (14, 14, 16), "anchored": False, "solid": True, "periodic": (False, False, True)},
 }

@@ -194,7 +194,7 @@ def test_sweeps_that_go_too_far_save_iterations_between_smooth_walls(monkeypatch
         return sum(sum(report.pressure_iterations) for report in reports), fluid.velocity
 
     over_relaxed, velocity = flow()
-    monkeypatch.setattr(multigrid, "OVER", 1.0)
+    monkeypatch.setattr(multigrid, "OVER_RELAXATION", 1.0)
     balanced, same = flow()
     assert over_relaxed < 0.95 * balanced
     np.testing.assert_allclose(velocity, same, rtol=0.0, atol=1e-7)

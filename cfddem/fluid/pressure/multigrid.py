@@ -56,9 +56,9 @@ SMALL = 20_000
 SWEEPS = 2
 """Sweeps before and after each coarse correction."""
 
-OVER = 1.1
+OVER_RELAXATION = 1.1
 """Relaxation of sweeps between smooth walls, where sweeps that go too far smooth better than those that balance each
-cell: up to one iteration in five less. Boxes need it less, and keep their bits."""
+cell: up to a fifth fewer iterations. Boxes need it less, and keep their bits."""
 
 COARSEST = 32
 """Cells below which the multigrid stops coarsening and sweeps until converged."""
@@ -155,7 +155,7 @@ class PressureEquation:
         self.communicator = communicator
         self.levels = self._all_levels(grid)
         for level in self.levels if grid.walls else ():
-            level.relaxation = OVER
+            level.relaxation = OVER_RELAXATION
         self.finest = self.levels[0]
         self.closed_regions = closed_regions
         self.most_iterations = most_iterations

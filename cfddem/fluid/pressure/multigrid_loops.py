@@ -77,7 +77,7 @@ def take_diagonal(ax, ay, az, anchor, relaxation, diagonal, inverse, wet):
 
 
 @inline
-def _kept(kept, before, invert, balanced):
+def _relaxed(kept, before, invert, balanced):
     """A value after relaxation, which keeps a part of the one before: nothing in a solid cell, so that zero stays."""
     return balanced + (kept * before if invert > 0.0 else 0.0)
 
@@ -101,7 +101,7 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
         for i in range(1, nx - 1):
             new[i] = (new[i] + west[i] * here[i - 1] + west[i + 1] * here[i + 1]) * invert[i]
         if kept != 0.0:
-            _keep(kept, here, invert, new)
+            _relax_row(kept, here, invert, new)
         parity = (k + j + colour) & 1
         # The ends of a row can be neighbours across a periodic boundary: one after the other.
         for count_end in range(min(2, nx)):
@@ -109,16 +109,16 @@ def _relax_plane(k, colour, backward, x, b, matrix, new):
             if (i & 1) == parity:
                 left, right = neighbours(i, nx)
                 new[i] = (new[i] + west[i] * here[left] + west[right] * here[right]) * invert[i]
-                here[i] = new[i] if kept == 0.0 else _kept(kept, here[i], invert[i], new[i])
+                here[i] = new[i] if kept == 0.0 else _relaxed(kept, here[i], invert[i], new[i])
         for i in range(1, nx - 1):
             here[i] = new[i] if (i & 1) == parity else here[i]
 
 
 @vector_inline
-def _keep(kept, here, invert, new):
+def _relax_row(kept, here, invert, new):
     """Add what relaxation keeps of the values inside a row."""
     for i in range(1, new.size - 1):
-        new[i] = _kept(kept, here[i], invert[i], new[i])
+        new[i] = _relaxed(kept, here[i], invert[i], new[i])
 
 
 @threaded

@@ -123,6 +123,10 @@ def random_packing(
     """
     if not 0.0 < solid_fraction < 0.74:
         raise InputError("solid_fraction", solid_fraction, "above 0 and below 0.74")
+    if in_cylinder and shape[0] != shape[1]:
+        raise InputError("shape", shape, "of equal first two edges, the diameter of the cylinder")
+    if in_cylinder:
+        periodic = (False, False, periodic[2])
     diameters = np.asarray(diameters, float)
     volume = float(np.sum(np.pi / 6.0 * diameters**3)) / solid_fraction
     ratios = np.asarray(shape, float)

@@ -16,6 +16,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.backend.law_set import bind_arguments, check_compiles, compile_source
+from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     POTENTIAL,
     SHORT_POTENTIAL,
@@ -264,23 +265,3 @@ def speed_after_step(speed, film, integrated_gap, step, strength_per_mass, inver
             return guess
         guess = following
     return guess
-
-
-# ---------------------------------------------------------------- Newton's method
-
-
-@inline
-def next_guess(guess, excess, slope, low, high):
-    """Next guess for the root of an increasing function, and the bounds that hold it.
-
-    excess  value of the function at the guess
-    slope   of the function there
-    """
-    if excess > 0.0:
-        high = guess
-    else:
-        low = guess
-    following = guess - excess / slope
-    if not low < following < high:
-        following = 0.5 * (low + high)
-    return following, low, high
