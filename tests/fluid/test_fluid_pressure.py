@@ -75,7 +75,7 @@ CASES = {
         "anchored": False,
         "periodic": (True, True, True),
         "relaxation": OVER_RELAXATION,
-    },  # fmt: skip
+    },
     "odd periodic": {"cells": (11, 9, 15), "anchored": False, "periodic": (True, True, True)},
     "closed cylinder": {"cells": (14, 14, 16), "anchored": False, "solid": True, "periodic": (False, False, True)},
 }
