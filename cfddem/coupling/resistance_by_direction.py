@@ -6,9 +6,14 @@ conductance, in each principal direction with the resistance there. With :math:`
 
 .. math:: J = h\,B\,D^{-1}\left[(2+\Lambda)(u-v) - (1+\Lambda)\frac{hf}{C}\right],\qquad D = 2 + 2\Lambda + \Lambda^2
 
-at the velocity u of the fluid before the step. A change of u in the step acts through b* on both sides, so that the
-fluid stays stable, and its equations keep one conductance for all directions. It follows forces in directions of lower
-resistance as if it had up to the inertia of the particle more.
+at the velocity u of the fluid that is foreseen: that before the step, changed once more as in the last one. What it
+changes beyond that acts through b* on both sides, so that the fluid stays stable, and its equations keep one
+conductance for all directions. With the change du of the step before,
+
+.. math:: m\,du' = F - b^*\,du' + (b^* - B^*)\,du
+
+for fluid of the mass m (over h) and a force F. So du' settles where the fluid has the inertia of B*, by a factor
+(b* - B*)/(m + b*) in each step.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ class Directions(NamedTuple):
     """How the resistance of every particle depends on direction."""
 
     lacks: Array  # what it lacks of the conductance, a symmetric tensor (N, 3, 3) [kg/s]
-    slip: Array  # u - v before the step, with all that acts through the resistance (N, 3) [m/s]
+    slip: Array  # foreseen u less v before the step, with all that acts through the resistance (N, 3) [m/s]
 
 
 def slip_of(force: Array, conductance: Array, lacks: Array) -> Array:

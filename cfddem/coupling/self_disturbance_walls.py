@@ -189,7 +189,7 @@ def _leave_flow(position, axis, place, inward, flow, cell, left):
                 flow_here += 2.0 * part * (1.0 - part) * _along(beside[1, row, k, d], first, second)
                 of_cells = (1.0 - across) * _along(alone[d, k, 0], first, second)
                 of_cells += across * _along(alone[d, k, 1], first, second)
-                left[n, k, d] *= 1.0 + (flow_here / of_cells - 1.0) / beyond
+                left[n, k, d] *= 1.0 + (flow_here / max(of_cells, 1e-300) - 1.0) / beyond
 
 
 @inline

@@ -50,6 +50,7 @@ class ForceTerms:
         self.conductances: dict[str, Array] = {}
         self.fluctuations: dict[str, Array] = {}
         self.lacks: dict[str, Array] = {}  # what the resistance of a line lacks of its conductance, by direction
+        self.foreseen: Array | float = 0.0  # change of the fluid in the step that resistance by direction expects [m/s]
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
@@ -112,7 +113,7 @@ class ForceTerms:
         if not self.lacks:
             return None
         slip = self.flow.slip / np.reshape(self.flow.narrowing, (-1, 1)) + self.flow.unseen - self.unseen
-        return Directions(total(self.lacks, slip), slip)
+        return Directions(total(self.lacks, slip), slip + self.foreseen)
 
     def receive(self, force: Array) -> None:
         """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].

@@ -24,6 +24,7 @@ from cfddem.backend.errors import InputError
 from cfddem.coupling.terms import ForceTerms
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
+from cfddem.model.fields import Field
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import dot, flat, of_row
 from cfddem.particles.walls.arrays import wall_arrays
@@ -34,6 +35,12 @@ from closures.wall_drag import along_wall, film_along_wall, towards_wall
 
 CLOSEST = 1e-4
 """Gap over the radius, at least; what grows further is in the films."""
+
+
+SEEN = Field(
+    "wall_drag_flow", "m/s", 3, "memory", np.nan, meaning="fluid velocity at the particle before the last fluid step"
+)
+"""NaN in inserted particles, which have seen none."""
 
 
 class WallTerms(NamedTuple):
@@ -52,7 +59,7 @@ class WallDrag(FluidForce):
     shear   whether they resist sliding
     """
 
-    name, lines = "wall_drag", ("drag",)
+    name, lines, fields = "wall_drag", ("drag",), (SEEN,)
 
     def __init__(
         self, walls: Sequence[Wall], which: Literal["nearest", "all"], *, film: bool, shear: bool = False
@@ -64,8 +71,16 @@ class WallDrag(FluidForce):
         self._surfaces, self._options = (flat_walls.kind, flat_walls.shape), (which == "all", film, shear)
 
     def act(self, terms: ForceTerms) -> None:
-        """Resist the slip, by direction."""
-        terms.resist("drag", *self.terms(terms.particles, terms.step))
+        """Resist the slip, by direction; the fluid is foreseen to change as much as in the last step."""
+        beside, flow, seen = self.terms(terms.particles, terms.step), _flow(terms), terms.particles[SEEN.name]
+        terms.resist("drag", beside.conductance, beside.lacks)
+        if terms.last_step > 0.0:
+            change = (terms.step / terms.last_step) * (flow - seen)
+            terms.foreseen = np.where(np.isnan(seen), 0.0, 0.5 * change)  # drag sees the mean over the step
+
+    def end(self, terms: ForceTerms) -> None:
+        """Store the fluid velocity before the step."""
+        terms.particles[SEEN.name][:] = _flow(terms)
 
     def terms(self, particles: Particles, step: float = 0.0) -> WallTerms:
         """Extra resistance of every particle over a step [s]."""
@@ -74,13 +89,18 @@ class WallDrag(FluidForce):
         return terms
 
 
+def _flow(terms: ForceTerms) -> Array:
+    """Velocity of the fluid at the particles before the step (N, 3) [m/s]."""
+    return np.asarray(terms.flow.slip + terms.particles.velocity)
+
+
 @inline
 def _factors(gap, rise, film, shear):
     """What a wall adds to the drag factor towards it and along it, over a step in which the gap rises so much."""
     beyond = 1.0 if gap >= 1.0 else 0.0  # the share of the step in which no film acts
     if rise != 0.0:
         beyond = min(max((max(gap, gap + rise) - 1.0) / abs(rise), 0.0), 1.0)
-    across = towards_wall(gap) - 1.0 + (beyond if film else 1.0) / gap
+    across = towards_wall(gap) - 1.0 + (beyond / max(gap, 1.0) if film else 1.0 / gap)
     along = along_wall(gap) - 1.0
     if shear:
         along -= film_along_wall(gap)
