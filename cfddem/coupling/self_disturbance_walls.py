@@ -390,7 +390,7 @@ class _Normal:
 
     def _eigenvectors(self, matrix: Array, mass: Array) -> tuple[Array, Array, Array]:
         """Rates, eigenvectors, and what forces drive of each; complex for smooth walls."""
-        if np.allclose(self._along, self._along.T, rtol=1e-12, atol=0.0):
+        if np.allclose(self._along, self._along.T, rtol=1e-12, atol=0.0):  # local: of modes
             rates, vectors = eigh(matrix, mass)
             return rates, vectors, vectors.T
         rates, vectors = eig(matrix, mass)

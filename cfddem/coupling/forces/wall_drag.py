@@ -72,11 +72,11 @@ class WallDrag(FluidForce):
 
     def act(self, terms: ForceTerms) -> None:
         """Resist the slip, by direction; the fluid is foreseen to change as much as in the last step."""
-        beside, flow, seen = self.terms(terms.particles, terms.step), _flow(terms), terms.particles[SEEN.name]
+        beside, flow, before = self.terms(terms.particles, terms.step), _flow(terms), terms.particles[SEEN.name]
         terms.resist("drag", beside.conductance, beside.lacks)
         if terms.last_step > 0.0:
-            change = (terms.step / terms.last_step) * (flow - seen)
-            terms.foreseen = np.where(np.isnan(seen), 0.0, 0.5 * change)  # drag sees the mean over the step
+            change = (terms.step / terms.last_step) * (flow - before)
+            terms.foreseen = np.where(np.isnan(before), 0.0, 0.5 * change)  # drag sees the mean over the step
 
     def end(self, terms: ForceTerms) -> None:
         """Store the fluid velocity before the step."""
