@@ -123,7 +123,7 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
         (b"viscosity = 1.8 * 10^-5\n", "; powers of ten are written 1.8e-5"),
         (b'title = "bed\n', ":1: must be valid TOML; a string without its closing quotation mark"),
         (b"start = expanded\n", "must be valid TOML; Invalid value in column 9; strings need quotation marks"),
-        (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each solid"),
+        (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each; the line is"),
         (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
         (b"x = " + b"[" * 100_000, "must be a case with lists and tables nested a few levels deep"),
         (
