@@ -200,8 +200,8 @@ def check_compiles(key: str, law: Callable[..., Any], values: int = 1) -> None:
         returned = loop.overloads[taken].signature.return_type
     except Exception as refusal:
         raise InputError(key, law.__name__, "a law that can be compiled", first_cause(refusal) + place) from None
-    each = tuple(returned) if isinstance(returned, types.BaseTuple) else (returned,)
-    if (values == 1 and each != (returned,)) or len(each) != values or not all(map(_is_number, each)):
+    kinds = tuple(returned.types) if isinstance(returned, types.BaseTuple) else (returned,)
+    if (values == 1 and kinds != (returned,)) or len(kinds) != values or not all(map(_is_number, kinds)):
         limit = "a law that returns a number" if values == 1 else f"a law that returns {values} numbers"
         raise InputError(key, law.__name__, limit, f"it returns {_in_words(returned)}{place}")
 
@@ -215,8 +215,8 @@ def _in_words(kind: Any) -> str:
     if isinstance(kind, types.BaseTuple):
         return f"{len(kind)} values"
     kind = types.unliteral(kind)
-    known = {types.none: "nothing", types.unicode_type: "a string", types.float64: "a number"}
-    return known.get(kind, f"a value of type {kind}")
+    names = {types.none: "nothing", types.unicode_type: "a string", types.float64: "a number"}
+    return names.get(kind, f"a value of type {kind}")
 
 
 def fingerprint(value: Any) -> str:
