@@ -200,7 +200,7 @@ def check_compiles(key: str, law: Callable[..., Any], values: int = 1) -> None:
         returned = loop.overloads[taken].signature.return_type
     except Exception as refusal:
         raise InputError(key, law.__name__, "a law that can be compiled", first_cause(refusal) + place) from None
-    kinds = tuple(returned.types) if isinstance(returned, types.BaseTuple) else (returned,)
+    kinds = getattr(returned, "types", (returned,))  # of a tuple
     if (values == 1 and kinds != (returned,)) or len(kinds) != values or not all(map(_is_number, kinds)):
         limit = "a law that returns a number" if values == 1 else f"a law that returns {values} numbers"
         raise InputError(key, law.__name__, limit, f"it returns {_in_words(returned)}{place}")
