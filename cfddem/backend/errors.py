@@ -70,7 +70,7 @@ def failure_elsewhere(message: str, exit_code: int) -> CfddemError:
 
 
 def nearest(word: str, allowed: Iterable[str]) -> str:
-    """The limit to state for an unknown word: all known words, or the nearest of many, and the nearest one.
+    """The limit to state for an unknown word: all known words, or the nearest of many, and the one that was meant.
 
     >>> nearest("restituton", ["friction", "restitution"])
     "one of friction, restitution (did you mean 'restitution'?)"
@@ -79,7 +79,8 @@ def nearest(word: str, allowed: Iterable[str]) -> str:
     """
     words = list(allowed)
     close = get_close_matches(word, words, 3, ALIKE) or get_close_matches(_plain_name(word), words, 3, ALIKE)
-    shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
+    few = len(words) <= (MANY if close else 2 * MANY)
+    shown = words if few else close or get_close_matches(_plain_name(word), words, 2, 0.0)
     more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""
     return f"one of {', '.join(shown)}{more}" + (f" (did you mean {close[0]!r}?)" if close else "")
 

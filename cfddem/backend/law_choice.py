@@ -107,7 +107,7 @@ def _user_defined(kind: str, function: Callable[..., float]) -> Law:
     try:
         return law_of(function)
     except KeyError as failure:
-        raise InputError(f"laws.{kind}", None, "a law", str(failure.args[0])) from None
+        raise InputError(kind, None, "a law", str(failure.args[0])) from None
 
 
 # ---------------------------------------------------------------- a file of laws

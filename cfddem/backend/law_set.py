@@ -33,7 +33,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba import float64
+from numba import float64, types
 
 from cfddem.backend.compile import either, inline, part, renamed, threaded, threaded_part, vector_part
 from cfddem.backend.errors import InputError
@@ -148,18 +148,24 @@ def _compiled_law(law: FunctionType, mark: str) -> Any:
     return inline(twin)
 
 
-def bind_arguments(law: Callable[..., Any], arguments: str, sources: Mapping[str, str], result: str = "{}") -> Any:
+def bind_arguments(
+    law: Callable[..., Any], arguments: str, sources: Mapping[str, str], result: str = "{}", values: int = 1
+) -> Any:
     """A law with named arguments as a template calls it.
 
     law        takes some of the names of `sources`, in any order
     arguments  of the template's call, for instance "contact, row"
     sources    name -> where the template has it, for instance {"overlap": "contact.overlap"}
     result     what to make of the value
+    values     how many numbers it returns
+    errors     InputError for an argument that the template does not have, and for a user's law that does not compile
     """
     taken = list(inspect.signature(law).parameters)
     for name in taken:
         if name not in sources:
             raise InputError(f"argument of {law.__name__}", name, f"one of {', '.join(sources)}")
+    if not (law.__module__ or "").startswith(("cfddem.", "closures.")):
+        check_compiles("law", law, values)
     call = result.format(f"law({', '.join(sources[name] for name in taken)})")
     return compile_source(f"def adapter({arguments}):\n    return {call}\n", law=callable_in_loops(law))
 
@@ -177,18 +183,40 @@ def compile_source(source: str, how: Callable[..., Any] = inline, **names: Any) 
     return how(function)
 
 
-def check_compiles(key: str, law: Callable[..., Any]) -> None:
-    """Refuse a user's law that cannot be compiled, by its name.
+def check_compiles(key: str, law: Callable[..., Any], values: int = 1) -> None:
+    """Refuse a user's law that cannot be compiled or does not return numbers, by its name, file and line.
 
-    key  for which the law is chosen, as in a case
+    key     for which the law is chosen, as in a case
+    values  how many numbers it returns
     """
     loop = callable_in_loops(law)
     if not hasattr(loop, "compile"):  # compilation is switched off
         return
+    code = _plain(law).__code__
+    place = "" if code.co_filename.startswith("<") else f" ({code.co_filename}:{code.co_firstlineno})"
+    taken = (float64,) * len(inspect.signature(law).parameters)
     try:
-        loop.compile((float64,) * len(inspect.signature(law).parameters))
+        loop.compile(taken)
+        returned = loop.overloads[taken].signature.return_type
     except Exception as refusal:
-        raise InputError(key, law.__name__, "a law that can be compiled", first_cause(refusal)) from None
+        raise InputError(key, law.__name__, "a law that can be compiled", first_cause(refusal) + place) from None
+    kinds = getattr(returned, "types", (returned,))  # of a tuple
+    if (values == 1 and kinds != (returned,)) or len(kinds) != values or not all(map(_is_number, kinds)):
+        limit = "a law that returns a number" if values == 1 else f"a law that returns {values} numbers"
+        raise InputError(key, law.__name__, limit, f"it returns {_in_words(returned)}{place}")
+
+
+def _is_number(kind: Any) -> bool:
+    return isinstance(kind, types.Float | types.Integer | types.Boolean)
+
+
+def _in_words(kind: Any) -> str:
+    """What a law returns, by the compiler's name of its type."""
+    if isinstance(kind, types.BaseTuple):
+        return f"{len(kind)} values"
+    kind = types.unliteral(kind)
+    names = {types.none: "nothing", types.unicode_type: "a string", types.float64: "a number"}
+    return names.get(kind, f"a value of type {kind}")
 
 
 def fingerprint(value: Any) -> str:

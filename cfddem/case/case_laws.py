@@ -124,9 +124,7 @@ class CaseLaws(Checked):
     @classmethod
     def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
         kind = about.field_name or ""
-        if value not in BUILT_IN.get(kind, ()) and (isinstance(value, str) or kind != "drag"):
-            return _installed(kind, value, about)
-        return value
+        return value if value in BUILT_IN.get(kind, ()) else _installed(kind, value, about)
 
     @field_validator("added_mass")
     @classmethod

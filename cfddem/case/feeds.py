@@ -51,7 +51,7 @@ def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
             yield InputError(
                 f"{key}.solid", None, "given in a case with a fluid: thin, inside, outside or none", remedy
             )
-        if wall.leaves_its_place and wall.solid != "none":
+        if wall.leaves_its_place and wall.side != "none":
             remedy = "the cells of the fluid do not move; a wall may move along itself"
             yield InputError(f"{key}.solid", wall.solid, "none for a wall that leaves its place in a fluid", remedy)
     if case.wall and case.bed.start in AT_RANDOM:

@@ -123,5 +123,5 @@ def full_key(key: str) -> str:
         raise InputError("key", key, f"written as {meant}", "NAME is the name of a material of the case")
     if not homes:
         keys = sorted({*Case.model_fields, *itertools.chain(*tables.values())})
-        raise InputError("key", key, nearest(key, keys), absent(key))
+        raise InputError("key", key, nearest(key, keys), absent(key) or "cfddem new --schema shows all")
     return homes[0]

@@ -61,9 +61,16 @@ def input_error(
     more     further errors, found elsewhere; not told where a table is missing
     place    location of a key, such as "bed.toml:14: "
     """
-    reported, whole_tables = _without_moved_keys(_by_key(failure, values), values, model)
+    misshapen = list(_misshapen(values, model)) if isinstance(values, Mapping) else []
+    tables = {key for key, _ in misshapen}
+    reports = {
+        key: several for key, several in _by_key(failure, values).items()
+        if not any(key[:length] in tables for length in range(1, len(key) + 1))
+    }  # fmt: skip
+    reported, whole_tables = _without_moved_keys(reports, values, model)
     of_keys = [(key, _one(key, several, model)) for key, several in itertools.islice(reported.items(), MOST)]
     errors = []
+    whole_tables = [*misshapen, *whole_tables]
     others = () if whole_tables else (((), error) for error in more)  # which follow from a missing table
     for key, error in [*whole_tables, *of_keys, *others]:
         beyond = error.field.removeprefix(dotted(key)).strip(".")  # a section names a key of its own
@@ -80,6 +87,39 @@ def _by_key(failure: ValidationError, values: Any) -> dict[Key, list[Any]]:
     for report in failure.errors(include_url=False):
         by_key.setdefault(_key(report["loc"], values, report["type"]), []).append(report)
     return by_key
+
+
+def _misshapen(values: Any, model: type[BaseModel], above: Key = ()) -> Iterator[tuple[Key, InputError]]:
+    """Tables that begin with the line of another sort, such as [wall] for [[wall]], or [patch] without a name."""
+    for name, field in model.model_fields.items():
+        value, key = values.get(name), (*above, name)
+        if not (isinstance(value, Mapping | list) and sections_of(field)):
+            continue
+        header, wrong = _header(dotted(key), field), _wrong_header(dotted(key), value, field)
+        if wrong:
+            limit = f"a table {header} for each" if "NAME" in header or "[[" in header else f"one table {header}"
+            yield key, InputError(dotted(key), None, limit, f"the line is {wrong}")
+        elif isinstance(value, Mapping):
+            yield from _misshapen(value, sections_of(field)[0], key)
+
+
+def _wrong_header(name: str, value: Mapping[str, Any] | list[Any], field: FieldInfo) -> str:
+    """The line with which a table seems to begin, if that is wrong; else empty."""
+    header = _header(name, field)
+    if isinstance(value, list):
+        return f"[[{name}]]" if "[[" not in header and any(map(_is_table, value)) else ""
+    if "[[" in header or ("NAME" in header and not all(map(_is_table, value.values()))):
+        return f"[{name}]"
+    for word, inner in value.items():
+        if header.count("NAME") > 1 and not all(map(_is_table, inner.values())):  # as [pair.glass]
+            return f"[{name}.{word}]"
+        if "NAME" not in header and len(value) == 1 and isinstance(inner, Mapping) and not _has_all(field, [word]):
+            return f"[{name}.{word}]" if _has_all(field, inner) else ""
+    return ""
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, Mapping | BaseModel)
 
 
 def _without_moved_keys(
@@ -269,6 +309,8 @@ def key_lines(text: str) -> dict[Key, int]:
         else:
             parts = (*table, *parts)
         lines.setdefault(parts, number)
+        for length in range(len(parts) - 1, 0, -1):  # a table [a.b] is a part of a
+            lines.setdefault(parts[:length], number)
     return lines
 
 

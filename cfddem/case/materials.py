@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import (
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -135,15 +134,7 @@ class MaterialPair(Checked):
         return properties
 
 
-def _named(values: Any) -> Any:
-    """Materials by name, as given; refused if the properties of a material stand in place of names."""
-    tables = values.values() if isinstance(values, Mapping) else ()
-    if tables and not any(isinstance(table, Mapping | Material) for table in tables):
-        raise InputError("material", None, "a table [material.NAME] for each solid", "for example [material.glass]")
-    return values
-
-
-Materials = Annotated[dict[str, Material], BeforeValidator(_named)]
+Materials = dict[str, Material]
 
 Pairs = dict[str, dict[str, MaterialPair]]
 

@@ -281,4 +281,4 @@ class CaseTables(Checked):
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""
-        return self.has_fluid and wall.solid != "none" and not wall.is_thin
+        return self.has_fluid and wall.side not in ("none", "thin")

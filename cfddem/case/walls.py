@@ -145,13 +145,18 @@ class CaseWall(Checked):
         return kind(velocity=velocity, spin=self.spin, centre=self.centre, **own)
 
     @property
+    def side(self) -> str | None:
+        """The side that is solid to a fluid: that of the case, or of the shape."""
+        return self.solid or self.form.side.default
+
+    @property
     def is_thin(self) -> bool:
         """Whether a fluid is on both sides of the wall, and does not pass through it."""
-        return (self.solid or self.form.side.default) == "thin"
+        return self.side == "thin"
 
     def closes(self, points: Array) -> NDArray[np.bool_]:
         """Which points (N, 3) [m] it closes to the fluid (N,)."""
-        if self.solid == "none" or self.is_thin:
+        if self.side in ("none", "thin"):
             return np.zeros(len(points), bool)
         return self.form.closes(points, self.solid)
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+from traceback import extract_tb
 from typing import Any, Literal
 
 import numpy as np
@@ -34,6 +36,9 @@ from closures.check import check as check_law
 
 LARGEST, SMALLEST = 1e20, 1e-30
 """Magnitudes of values of a case beyond which estimates overflow, or say nothing; 0 and seeds are free."""
+
+USUAL = 1e-12, 1e12
+"""Magnitudes of values that upset no estimate."""
 
 _EXTREME, _UNITS = "too large or too small for the correlations", "give all values in SI units: m, kg, s, Pa"
 
@@ -150,10 +155,14 @@ def _preflight(case: Case, title: str) -> Preflight:
         key = failure.field.replace("grid.", "column.")
         remedy = suggested_cell(case) if key == "column.cell" else failure.remedy or "change it"
         return Preflight(title, (), (Issue("error", key, reason, remedy),))
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, ValueError) as failure:
         if not fits(case):  # a length in mm upsets the estimates
             return Preflight(title, (), tuple(check_length(case, refused=True) or check_particle_size(case)))
         key, value = most_extreme(case)
+        if USUAL[0] <= abs(value) <= USUAL[1]:  # as a shape or a table of the user can do
+            at = [frame for frame in extract_tb(failure.__traceback__) if "numpy" not in Path(frame.filename).parts][-1]
+            reason = f"the check fails in {at.filename}:{at.lineno}: {type(failure).__name__}: {failure}"
+            return Preflight(title, (), (Issue("error", "case", reason, "see what Python code of yours returns"),))
         return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))
 
 

@@ -35,7 +35,7 @@ from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
 from cfddem.run.simulation import Simulation
-from cfddem.run.wall_loads import wall_load_columns, wall_loads
+from cfddem.run.wall_loads import loads_of_particles, wall_load_columns, wall_loads
 
 Function = Callable[[Simulation], float]
 """A measure: a number for the present state of a simulation."""
@@ -267,8 +267,9 @@ def pressure_drop(simulation: Simulation) -> float:
 
 @measure("Pa", when=_has_fluid)
 def wall_load(simulation: Simulation) -> float:
-    """Vertical contact force on floor and sides, per floor area."""
-    return -float(simulation.communicator.sum(simulation.particle_solver.wall_force[:, 2])) / open_area(simulation.case)
+    """Vertical force of the particles on floor, sides and other walls, films included, per floor area."""
+    force, _ = loads_of_particles(simulation.particle_solver)
+    return -math.fsum(force[:, 2]) / open_area(simulation.case)
 
 
 @measure("m2/s2", when=_is_bed)

@@ -98,6 +98,27 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ({"run": None}, "run: must be given; a table [run]; cfddem explain run lists its keys"),
         ({"inlet": {"velocity": 1.0}}, "evaporation; keys with this word: bed.inlet_velocity, "),
         ({"solver": {"name": "x"}}, "evaporation; cfddem new --schema shows all tables"),
+        (
+            {"wall": {"shape": "plane", "normal": [0.0, 0.0, 1.0]}},
+            "wall: must be a table [[wall]] for each; the line is [wall]",
+        ),
+        ({"outlet": {}}, "outlet: must be a table [[outlet]] for each; the line is [outlet]"),
+        (
+            {"patch": {"kind": "inlet", "velocity": 0.1, "shape": "disc"}},
+            "must be a table [patch.NAME] for each; the line is [patch]",
+        ),
+        ({"patch": [{"kind": "inlet"}]}, "patch: must be a table [patch.NAME] for each; the line is [[patch]]"),
+        (
+            {"pair": {"alumina": {"friction": 0.1}}},
+            "must be a table [pair.NAME.NAME] for each; the line is [pair.alumina]",
+        ),
+        ({"bed": [{"diameter": 1e-3, "count": 5}]}, "bed: must be one table [bed]; the line is [[bed]]"),
+        ({"bed.jet": [{"velocity": 1.0}]}, "bed.jet: must be one table [bed.jet]; the line is [[bed.jet]]"),
+        (
+            {"fluid": {"water": {"density": 1e3, "viscosity": 1e-3}}},
+            "must be one table [fluid]; the line is [fluid.water]",
+        ),
+        ({"laws.contact_parameter.normal_stiffness": 1.0}, "(did you mean 'contact_parameters'?)"),
         ({"title": "two\nlines"}, "title = 'two\\nlines': must be one line"),
     ],
     ids=str,
@@ -123,7 +144,7 @@ def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: s
         (b"viscosity = 1.8 * 10^-5\n", "; powers of ten are written 1.8e-5"),
         (b'title = "bed\n', ":1: must be valid TOML; a string without its closing quotation mark"),
         (b"start = expanded\n", "must be valid TOML; Invalid value in column 9; strings need quotation marks"),
-        (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each solid"),
+        (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each; the line is"),
         (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
         (b"x = " + b"[" * 100_000, "must be a case with lists and tables nested a few levels deep"),
         (

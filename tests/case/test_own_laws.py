@@ -24,6 +24,7 @@ from cfddem.backend.law_choice import import_laws
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.drag import Drag
 from cfddem.io.reading import open_run
+from cfddem.particles.interactions.film_law import FilmLaw
 from cfddem.particles.interactions.laws import Laws
 from cfddem.plotting.report_page import page
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -128,6 +129,37 @@ def test_a_law_that_cannot_be_compiled_leaves_no_folder(declare: Declare, tmp_pa
     with pytest.raises(InputError, match=r"laws.drag = 'mine': must be a law that can be compiled; .*use numbers"):
         Run.begin(case, tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("(gap, 1.0)", "must be a law that returns a number; it returns 2 values"),
+        ("'much'", "must be a law that returns a number; it returns a string"),
+        ("None", "must be a law that returns a number; it returns nothing"),
+        (
+            "eta / gap",
+            "must be a law that can be compiled; NameError: name 'eta' is not defined; use numbers, math and",
+        ),
+    ],
+)
+def test_a_law_of_pairs_that_loops_cannot_use_is_refused_by_its_name(value: str, said: str) -> None:
+    scope: dict[str, Any] = {"__name__": "a_package"}
+    exec(compile(f"\ndef mine(gap, viscosity, reduced_radius):\n    return {value}\n", "my_laws.py", "exec"), scope)
+    with pytest.raises(InputError) as refusal:
+        Laws(film=True, lubrication=FilmLaw(scope["mine"])).check()
+    assert str(refusal.value).startswith(f"laws.lubrication = 'mine': {said}")
+    assert str(refusal.value).endswith("(my_laws.py:2)") and "\n" not in str(refusal.value)
+
+
+def test_drag_without_a_declaration_is_refused_where_the_case_is_made() -> None:
+    with pytest.raises(InputError, match=r"laws.drag: must be a law; '<lambda>' is not a registered law; decorate it"):
+        Case.from_text(TEXT, "bed.toml", {"laws.drag": lambda reynolds, voidage: 1.0})
+
+
+def test_drag_that_returns_no_number_is_refused_without_a_case(declare: Declare) -> None:
+    with pytest.raises(InputError, match=r"law = 'mine': must be a law that returns a number; it returns 2 values"):
+        Drag(law_of(declare("mine", "(1.0, 2.0)")), "A")
 
 
 def test_a_law_that_is_not_finite_in_a_run_is_named_with_its_arguments() -> None:

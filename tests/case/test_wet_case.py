@@ -120,6 +120,8 @@ def test_a_wet_case_survives_its_own_text() -> None:
     with pytest.raises(InputError, match=r"must be written as fluid\.density or material\.NAME\.density"):
         full_key("density")
     assert full_key("surface_tension") == "liquid.surface_tension"
+    with pytest.raises(InputError, match=r"must be one of \w+, \w+ and \d+ more; cfddem new --schema shows all"):
+        full_key("nonsense")
 
 
 def test_the_density_of_a_film_reaches_the_laws() -> None:

@@ -23,7 +23,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.meshes import Mesh, read_stl
-from cfddem.particles.walls.wall import Wall
+from cfddem.particles.walls.wall import SolidSide, Wall
 from cfddem.plotting.case_drawing import case_drawing
 from cfddem.preflight.summary import preflight
 from cfddem.run.simulation import Simulation
@@ -97,6 +97,23 @@ def test_every_part_of_the_package_knows_the_shape(page: dict[str, Any]) -> None
     assert in_fluid.thin_walls == case.wall and grid_of(in_fluid).walls
     drawn = len(case_drawing(case).axes[0].patches)
     assert drawn == len(case_drawing(case.with_(wall=[])).axes[0].patches) + 96
+
+
+def test_a_shape_may_leave_the_fluid_alone_by_default(page: dict[str, Any]) -> None:
+    """And of one that fails the check tells the error, not the largest value of the case."""
+    liquid = {"density": 1000.0, "viscosity": 1e-3}
+    for default in ("none", "inside"):
+        alone = {
+            "side": property(lambda _, default=default: SolidSide(default)),
+            "corners": lambda _: np.zeros((0, 3, 3)),
+        }
+        register("ghost", type("Ghost", (page["Ring"],), alone))
+        in_fluid = page["case"].with_(fluid=liquid, wall=[{**page["case"].wall[0].model_dump(), "shape": "ghost"}])
+        issues = preflight(in_fluid).issues
+        assert in_fluid.closes_cells(in_fluid.wall[0]) is (default == "inside") and not in_fluid.thin_walls
+        told = [issue.reason for issue in issues if issue.key == "case"]
+        assert len(told) == (default == "inside") and all("ValueError: zero-size array" in each for each in told)
+        forget_shape("ghost")
 
 
 def test_what_does_not_fit_is_refused_before_anything_changes(page: dict[str, Any]) -> None:

@@ -21,6 +21,7 @@ from cfddem.particles.state import make_particles
 from cfddem.particles.walls.meshes import Mesh
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Plane
 from cfddem.particles.walls.wall import Wall
+from cfddem.run import history
 from cfddem.run.wall_loads import wall_load_columns, wall_loads
 from closures import contact
 
@@ -305,6 +306,19 @@ def test_the_film_of_a_paddle_is_in_its_force_and_torque() -> None:
     assert [given[f"wall_0_force_{axis}"] for axis in "xyz"] == pytest.approx(-MASS * velocity, abs=2e-3 * MASS)
     momentum = MASS * np.cross(place - np.array([0.1, 0.0, -0.01]), velocity)[1]
     assert given["wall_0_torque"] == pytest.approx(-momentum, rel=5e-3)
+
+
+def test_a_film_that_stops_a_sphere_is_in_the_load_of_the_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without contact: the load of the history, over the steps, is the momentum that the sphere has lost."""
+    monkeypatch.setattr(history, "open_area", lambda _: 2.0)
+    run = sphere([0.0, 0.0, 1.1 * RADIUS], [Plane()], film=1.0, gravity=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, -0.01))
+    simulation, given = SimpleNamespace(particle_solver=run, case=None), 0.0
+    for _ in range(500):
+        run.advance(STEP)
+        given += 2.0 * history.wall_load(simulation) * STEP  # type: ignore[arg-type]
+    lost = MASS * (run.particles.velocity[0, 2] + 0.01)
+    assert lost > 0.5 * 0.01 * MASS and not run.wall_force.any()
+    assert given == pytest.approx(lost, rel=1e-3)
 
 
 @pytest.mark.parametrize("wall", [Box(low=(-0.02, -0.02, 0.0), high=(0.02, 0.02, 0.02)), sheet(5, size=0.04)], ids=str)

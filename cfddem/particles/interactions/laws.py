@@ -305,7 +305,8 @@ def contact_choices(law: ContactLaw) -> dict[str, Any]:
     if law.remember is None:
         choices["remember"] = compile_source(f"def remember({ARGUMENTS}):\n    return m\n")
     else:
-        choices["remember"] = bind_arguments(law.remember, ARGUMENTS, places, "({},)" if len(law.memory) == 1 else "{}")
+        result = "({},)" if len(law.memory) == 1 else "{}"
+        choices["remember"] = bind_arguments(law.remember, ARGUMENTS, places, result, len(law.memory))
     names = [field.name for field in law.memory]
     choices["read_memory"] = compile_source(
         f"def read_memory(memory, k):\n    return ({''.join(f'memory.{name}[k], ' for name in names)})\n"
@@ -329,7 +330,7 @@ def check_contact_law(law: ContactLaw) -> None:
             raise InputError(f"contact_parameters.{name}", value, "at least 0 and finite")
     for function in law.functions:
         if not function.__module__.startswith("cfddem."):
-            check_compiles("laws.contact", function)
+            check_compiles("laws.contact", function, len(law.memory) if function is law.remember else 1)
     for memory in law.memory:
         place = f"memory of the contact law {law.name!r}"
         if memory.components:

@@ -23,7 +23,7 @@ ROUNDING = 1e-9
 class SolidSide(NamedTuple):
     """Side of a wall whose cells are solid to a fluid.
 
-    default  where a case says nothing: "behind", "inside" or "thin"; None if the case has to say it
+    default  where a case says nothing: "behind", "inside", "thin" or "none"; None if the case has to say it
     allowed  what the case may say
     why      it may not say more
     """
