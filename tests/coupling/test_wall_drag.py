@@ -354,7 +354,7 @@ def beside_a_smooth_wall(
 def test_the_flow_that_a_sphere_drives_along_a_wall_is_the_one_that_is_subtracted(vessel: str) -> None:
     """A small force that acts along the wall for 6 s: both within 0.8 % of the velocity of the sphere far from walls.
 
-    The flow is 4 to 16 % of it. Cells are cut at many places, and the sphere is between cells.
+    The flow is 4 to 9 % of it. Cells are cut at many places, and the sphere is between cells.
     """
     unit, errors = 6.0 * math.pi * OIL[1] * RADIUS_OF_NYLON, []
     simulation = beside(0.0, 0.25 * (vessel == "cone"), 3.0, 6.3).moving(
@@ -459,7 +459,7 @@ def bead_on_the_floor(step: float | None, friction: float) -> tuple[float, float
 
 
 def test_a_bead_without_films_slows_down_along_the_floor_alike_in_any_step() -> None:
-    """The resistance towards the floor, 2000 times that along it, has no effect on this motion, which begins at 10
+    """The resistance towards the floor, 1400 times that along it, has no effect on this motion, which begins at 10
     mm/s. With friction the contacts, whose forces act a step late, change it by 6 %."""
     for friction, error in ((0.0, 5e-3), (0.4, 0.08)):
         (coarse, height), (fine, _) = (bead_on_the_floor(step, friction) for step in (None, 1e-4))
