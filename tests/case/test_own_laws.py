@@ -365,7 +365,8 @@ def test_sweeps_import_laws_of_a_file_also_in_other_processes(
     about = Path("seeds/seed-1/run.json")
     about.write_text(about.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
     done = call(*words)
-    assert done.code == 3 and "the source of laws.drag has changed" in done.err and done.err.count("\n") == 1
+    faults = [line for line in done.err.splitlines() if "means still drift" not in line]  # of the run that is kept
+    assert done.code == 3 and len(faults) == 1 and "the source of laws.drag has changed" in faults[0]
 
 
 def test_commands_of_a_job_array_name_the_files_of_laws(
