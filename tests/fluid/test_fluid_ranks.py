@@ -63,6 +63,8 @@ def solved_on_ranks(case: dict[str, Any], shape: Sequence[int]) -> tuple[tuple[A
         if not case.get("anchored", True):
             closed = ClosedRegions.numbered(block.part(grid.open.astype(np.int64)), communicator)
         own = shared.pressure_equation(block, closed, communicator, periodic, np.array([False, False, True]))
+        for level in own.levels:
+            level.relaxation = case.get("relaxation", 1.0)
         for mine, whole in zip(own.coefficients, system.coefficients):
             mine[:] = block.part(whole)
         own.prepare()
