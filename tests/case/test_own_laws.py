@@ -365,8 +365,9 @@ def test_sweeps_import_laws_of_a_file_also_in_other_processes(
     about = Path("seeds/seed-1/run.json")
     about.write_text(about.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
     done = call(*words)
-    faults = [line for line in done.err.splitlines() if "means still drift" not in line]  # of the run that is kept
-    assert done.code == 3 and len(faults) == 1 and "the source of laws.drag has changed" in faults[0]
+    fault, *others = done.err.splitlines()  # of the run that is kept
+    assert done.code == 3 and "the source of laws.drag has changed" in fault
+    assert not others or others[0].startswith("cfddem: warning: means still drift")  # in the other run
 
 
 def test_commands_of_a_job_array_name_the_files_of_laws(
