@@ -9,8 +9,9 @@ would drive far from walls this is the share of each mode, r^2 towards the wall 
 .. math:: u_k \to \left[r_t + nn\,(r_n - r_t)\right]\cdot u_k
 
 Between cells at tabulated distances d, what the wall takes, times d, is linear: the effect of a wall falls as 1/d. The
-force on a cell at a wall is carried by the wall within the cell, and a slanting one has more of it: the flow along it
-is less by the largest component of n. What a curved wall does beyond a plane one is left to the grid.
+force on a cell at a wall is carried by the wall within the cell. A slanting wall has 1/max|n| times the area of a face
+there, so that the flow along it is less by max|n|. This holds for cells at a mean distance up to 0.75 cells, and fades
+to nothing at 1.0, which is a choice. What a curved wall does beyond a plane one is left to the grid.
 
 The solid fraction that a particle gathers of its own is a sum over pairs of its cells. What each cell gathers of itself
 and of its neighbours is found with the kernel of the run, between all walls, once.
