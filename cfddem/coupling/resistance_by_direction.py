@@ -6,14 +6,14 @@ conductance, in each principal direction with the resistance there. With :math:`
 
 .. math:: J = h\,B\,D^{-1}\left[(2+\Lambda)(u-v) - (1+\Lambda)\frac{hf}{C}\right],\qquad D = 2 + 2\Lambda + \Lambda^2
 
-at the velocity u of the fluid that is foreseen: that before the step, changed once more as in the last one. What it
-changes beyond that acts through b* on both sides, so that the fluid stays stable, and its equations keep one
-conductance for all directions. With the change du of the step before,
+at the velocity u of the fluid that is foreseen: that before the step and half of the change du of the last one, since
+drag sees the mean of a heavy fluid over the step. What else it changes acts through b* on both sides, so that the fluid
+stays stable, and its equations keep one conductance for all directions. Its change in this step is du', with
 
-.. math:: m\,du' = F - b^*\,du' + (b^* - B^*)\,du
+.. math:: m\,du' = F - \tfrac12 b^*\,du' + \tfrac12 (b^* - B^*)\,du
 
-for fluid of the mass m (over h) and a force F. So du' settles where the fluid has the inertia of B*, by a factor
-(b* - B*)/(m + b*) in each step.
+for fluid of the mass m (over h) and a force F. So du' settles where the fluid feels B* alone, by a factor
+(b* - B*)/(2m + b*) in each step. A light fluid, whose drag sees more of du', keeps a part of the excess.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _slip_of(force, conductance, lacks, slip):
 
 
 @inline
-def _squared(matrix):
+def _denominator(matrix):
     """2 + 2 M + M^2 of a symmetric matrix."""
     x = plus(times(2.0, matrix[0]), through(matrix, matrix[0]))
     y = plus(times(2.0, matrix[1]), through(matrix, matrix[1]))
@@ -83,7 +83,7 @@ def _force(n, slip, gain, conductance, lacks, share):
     stiffness = times(share, resistance[0]), times(share, resistance[1]), times(share, resistance[2])
     change = minus(slip, gain)
     wanted = plus(plus(slip, change), through(stiffness, change))
-    return through(resistance, solved(_squared(stiffness), wanted))
+    return through(resistance, solved(_denominator(stiffness), wanted))
 
 
 @threaded

@@ -358,9 +358,10 @@ class CouplingWork:
         fluctuating = np.zeros_like(received)
         for line, velocity in terms.fluctuations.items():
             share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
-            fluctuating = share[:, None] * conductance * velocity
             if terms.lacks:
                 fluctuating = gathered * terms.implicit_force_at(share[:, None] * velocity)
+            else:
+                fluctuating = share[:, None] * conductance * velocity
         none = np.zeros_like(received)
         return ImplicitWork(
             work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),

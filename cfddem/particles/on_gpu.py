@@ -36,7 +36,7 @@ from cfddem.backend.named import named_arrays
 from cfddem.particles.integrate import drift, gather_forces, kick, may_touch, wall_contact
 from cfddem.particles.interactions import joint_films
 from cfddem.particles.interactions.film import update_edge_film
-from cfddem.particles.interactions.joint_equations import film_residual, greater, impulses_on, prepare_film
+from cfddem.particles.interactions.joint_equations import change_by, film_residual, greater, prepare_film
 from cfddem.particles.interactions.joint_films import enter, is_due, leave, list_all_due, mark_due
 from cfddem.particles.interactions.joint_solution import (
     MOST_ITERATIONS,
@@ -58,7 +58,6 @@ from cfddem.particles.interactions.pair_loops import WRITTEN, pair_film, pair_fo
 from cfddem.particles.interactions.slots import FILM, JOINT, SLIDES
 from cfddem.particles.pair_graph import Graph
 from cfddem.particles.system import System
-from cfddem.particles.vectors import put, times
 from cfddem.particles.walls.mesh_contacts import pairs_at_walls
 from cfddem.particles.walls.nearest_point import advance_walls, touch_edge
 
@@ -376,10 +375,7 @@ def _spread(direction, system, threads):
         shear_impulse = memory.joint_shear_direction if direction else memory.joint_shear_impulse
         turn = particles.film_turn_along if direction else particles.film_turn
     for i in range(threads.mine, len(particles.radius), threads.number):
-        total, couple = impulses_on(i, impulse, shear_impulse, system)
-        put(change, i, times(particles.inverse_mass[i], total))
-        if SLIDES:
-            put(turn, i, times(particles.inverse_inertia[i], couple))
+        change_by(i, impulse, shear_impulse, change, turn, system)
 
 
 @helper

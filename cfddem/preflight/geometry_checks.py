@@ -15,6 +15,7 @@ from cfddem.case.schema import Case
 from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, vessel_of
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, Severity, percent
+from cfddem.preflight.wall_checks import enters
 
 RANDOM_CLOSE_PACKING = 0.64
 """Highest solid fraction of a bed of equal spheres [-]."""
@@ -213,11 +214,11 @@ def check_scales(case: Case) -> Iterator[Issue]:
         times = float((high - low).max() / size.max())
         if not LARGE_SURFACE < times < 1e3 * FITTING:
             continue
-        near = ((corners.min(axis=1) <= size) & (corners.max(axis=1) >= 0.0)).all(axis=1)
+        near = enters(corners, size)
         ends = " to ".join(f"({', '.join(f'{coordinate:.4g}' for coordinate in corner)})" for corner in (low, high))
-        where = "is" if near.any() else "lies outside the column and is"
+        where = "is" if near else "lies outside the column and is"
         yield Issue(
-            "warning" if near.any() else "error", f"wall.{number}.scale",
+            "warning" if near else "error", f"wall.{number}.scale",
             f"the surface, from {ends} m, {where} {times:.3g} times as large; is the file in millimetres?",
             "scale = 0.001 reads it in mm",
         )  # fmt: skip

@@ -111,11 +111,14 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
 
 
 def _enters(wall: CaseWall, column: np.ndarray) -> bool:
-    """Whether the box around some triangle of a wall reaches into a column of a size (3,) [m]."""
     try:
-        corners = wall.form.corners()
+        return enters(wall.form.corners(), column)
     except (InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
         return True
+
+
+def enters(corners: np.ndarray, column: np.ndarray) -> bool:
+    """Whether the box around some triangle (n, 3, 3) [m] reaches into a column of a size (3,) [m]."""
     return bool(((corners.min(axis=1) <= column) & (corners.max(axis=1) >= 0.0)).all(axis=1).any())
 
 

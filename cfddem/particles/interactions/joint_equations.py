@@ -252,6 +252,16 @@ def impulses_on(i, impulse, shear_impulse, system):
     return total, couple
 
 
+@inline
+def change_by(i, impulse, shear_impulse, change, turn, system):
+    """Write what impulses do to particle i: the change of its velocity and the turn of its spin; see `impulses_on`."""
+    particles = system.particles
+    total, couple = impulses_on(i, impulse, shear_impulse, system)
+    put(change, i, times(particles.inverse_mass[i], total))
+    if SLIDES:
+        put(turn, i, times(particles.inverse_inertia[i], couple))
+
+
 @part
 def spread(system, direction):
     """What the impulses of the films solved together do to every particle; or what their `direction` does."""
@@ -263,10 +273,7 @@ def spread(system, direction):
         shear_impulse = memory.joint_shear_direction if direction else memory.joint_shear_impulse
         turn = particles.film_turn_along if direction else particles.film_turn
     for i in prange(particles.owned):
-        total, couple = impulses_on(i, impulse, shear_impulse, system)
-        put(change, i, times(particles.inverse_mass[i], total))
-        if SLIDES:
-            put(turn, i, times(particles.inverse_inertia[i], couple))
+        change_by(i, impulse, shear_impulse, change, turn, system)
 
 
 @inline
