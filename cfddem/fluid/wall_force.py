@@ -1,4 +1,4 @@
-"""The force of a fluid on its smooth walls, and on the walls that are sides of its box."""
+"""The pressure of a fluid on the sides of its box, and its force on smooth walls and on sides that are walls."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from cfddem.fluid.boundaries import Side
 from cfddem.fluid.cut_cells import CutCells
 from cfddem.fluid.grid import HIGH, LOW, Array
+from cfddem.fluid.momentum import slip_weight
 from cfddem.fluid.solver import FluidSolver
 
 AROUND = 2.5
@@ -46,6 +47,67 @@ def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Ar
     return loads
 
 
+def pressure_fall(fluid: FluidSolver, axis: int) -> float:
+    """Mean pressure p' on the open faces of the low side of the box, less that on the high side [Pa]; of all ranks.
+
+    axis  0, 1, 2 for x, y, z; a periodic one has the fall that drives its flow
+    """
+    if fluid.boundaries.periodic[axis]:
+        return float(fluid.boundaries.driving[axis] * fluid.grid.whole.size[axis])
+    slope = fluid.cell_pressure_gradient()  # of all ranks, as in `loads_on_walls`
+    over = {False: np.zeros(0), True: np.zeros(0)}
+    for side in fluid.boundaries.sides:
+        if side.axis == axis:
+            open_cells = side.layer(fluid.grid.open, -1 if side.high else 0)
+            over[side.high] = pressure_on_side(fluid, side, slope)[open_cells]
+    total = fluid.communicator.sum
+    low, high = (float(total(faces)) / int(total(faces.size)) for faces in (over[False], over[True]))
+    return low - high
+
+
+def pressure_on_side(fluid: FluidSolver, side: Side, slope: Array) -> Array:
+    r"""Pressure p' on the faces of a side, over its plane without ghosts [Pa].
+
+    Outlets have the one that is given. Elsewhere half a cell lies between the side and the centres of the cells. With
+    the gradient g of the cell, and the drag D per volume that acts at the side and at the next face inward, the
+    pressure falls there, model A, by
+
+    .. math:: -g\,(1 + \varepsilon_\mathrm{face} - \varepsilon_\mathrm{cell}) + D_\mathrm{side} - D_\mathrm{face}
+
+    per length: the inertia of the next face, what the particles in the cell carry of the gradient, and the drag of the
+    half cell. So this pressure, the loads of the particles and the weight of both phases are in balance where a bed
+    that lies on the floor ends within the lowest cells, too. A line through the pressures of two cells does not do so.
+
+    slope  gradient of the pressure in cells (3, nz, ny, nx) [Pa/m]
+    """
+    d, fields, end = side.axis, fluid.fields, -1 if side.high else 0
+    face = side.face(fluid.grid)
+    cell, inward = (face - 1, -1) if side.high else (face, 1)
+
+    def plane(values: Any, at: int) -> Any:
+        return side.layer(values, at)[LOW:-HIGH, LOW:-HIGH]
+
+    def drag(at: int, velocity: Array) -> Array:
+        return plane(fields.drag, at) * velocity - plane(fields.drag_momentum[d], at)
+
+    here, beyond = (plane(fields.mean_voidage, at) for at in (cell, cell + inward))
+    between, normal = 0.5 * (here + beyond), fields.velocity[d]
+    at_side = drag(cell, plane(normal, face))
+    next_face = [drag(at, plane(normal, face + inward)) for at in (cell, cell + inward)]
+    weights = [slip_weight.py_func(between, voidage, fluid.model_b) for voidage in (here, beyond)]
+    at_face = 0.5 * (weights[0] * next_face[0] + weights[1] * next_face[1])
+    sources = [plane(fields.source[d], at) for at in (cell, cell + inward)]
+    steepness = side.layer(slope[d], end)
+    more = (
+        steepness * (1.0 - fluid.model_b) * (between - here)
+        + at_face - at_side
+        + 0.5 * (sources[0] - sources[1])
+    )  # fmt: skip
+    fall = steepness + plane(fluid.faces.solved[d], face + inward) * more
+    pressure = side.layer(fluid.pressure, end) - side.inward * 0.5 * fluid.grid.spacing[d] * fall
+    return np.where(side.outlet[LOW:-HIGH, LOW:-HIGH], side.pressure[LOW:-HIGH, LOW:-HIGH], pressure)
+
+
 def _on_side(fluid: FluidSolver, side: Side, slope: Array, viscosity: Array) -> tuple[Array, Array]:
     """Pressure and shear stress on the faces of a side that are walls: places (n, 3) [m], and forces (n, 3) [N].
 
@@ -62,7 +124,7 @@ def _on_side(fluid: FluidSolver, side: Side, slope: Array, viscosity: Array) -> 
     here = (share > 0.0) & ~np.isin(side.owner, side.inlets) & ~plane(side.outlet)
     area, half = grid.face_area(d) * share[here], 0.5 * grid.spacing[d]
     place = np.stack([side.layer(coordinate, end)[here] for coordinate in np.broadcast_arrays(*grid.faces(d))], axis=-1)
-    pressure = side.layer(fluid.pressure, end)[here] - side.inward * half * side.layer(slope, end)[d][here]
+    pressure = pressure_on_side(fluid, side, slope)[here]
     at_wall = side.layer(viscosity, end)[here]
     sticks = plane(side.mirror)[here] < 0.0
     velocity = np.moveaxis(fluid.velocity, -1, 0)

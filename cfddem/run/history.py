@@ -31,6 +31,7 @@ from cfddem.features.feature_list import FEATURES
 from cfddem.features.feeds import LANDED
 from cfddem.fluid.budgets import continuity_residual, drag_exchange
 from cfddem.fluid.cut_cells import open_share
+from cfddem.fluid.wall_force import pressure_fall
 from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
@@ -258,11 +259,9 @@ def bed_voidage_from_pressure(simulation: Simulation) -> float:
 @measure("Pa", when=_is_fluid_bed)
 def pressure_drop(simulation: Simulation) -> float:
     """Pressure drop from below the floor to the top, without the hydrostatic part."""
-    fluid, column = simulation.fluid, simulation.case.column
-    grid = grid_of(simulation.case)
-    drop = measures.pressure_drop(fluid.whole("pressure"), grid.spacing, 0.0, column.height, open_cells=grid.open)
+    fluid, grid = simulation.fluid, grid_of(simulation.case)
     inflow, voidage = fluid.grid.joined(fluid.volume_flux(2)[:-1])[0], fluid.whole("mean_voidage")[0]
-    return drop + measures.entrance_pressure_drop(inflow, voidage, fluid.density, grid.open[0])
+    return pressure_fall(fluid, 2) + measures.entrance_pressure_drop(inflow, voidage, fluid.density, grid.open[0])
 
 
 @measure("Pa", when=_has_fluid)

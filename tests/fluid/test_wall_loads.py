@@ -16,7 +16,7 @@ from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder, turned
 from cfddem.fluid.wall_force import SMOOTH, loads_on_walls
-from cfddem.run.history import all_columns, row
+from cfddem.run.history import all_columns, pressure_drop, row, wall_load
 from cfddem.run.simulation import Simulation
 
 
@@ -160,3 +160,53 @@ def test_the_fluid_has_a_force_on_those_walls_that_the_key_names(
     assert {name for name in of_particles if not name.endswith("_fluid")} == with_fluid | without
     said = str(type(case.run).model_fields["wall_forces"].description)
     assert "of particles on every wall, and of the fluid on floor, lid, sides of a box and the wall of a vessel" in said
+
+
+SETTLING = """
+column = { width = 0.012, height = 0.03, cell = 0.003, sides = "periodic", ends = "closed" }
+bed = { diameter = 1.0e-3, count = 900, start = "expanded" }
+fluid = { density = 1000.0, viscosity = 1.0e-3 }
+run = { until = 1.2 }
+
+[material.bead]
+density = 1100.0
+youngs_modulus = 5.0e7
+contact_modulus = 2.0e5
+poisson = 0.3
+restitution = 0.5
+friction = 0.5
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["A", "B"])
+def test_floor_and_fluid_carry_a_suspension_that_settles(model: str) -> None:
+    """The floor of a closed box has the weight of the sediment by contacts, and that of the rest by the pressure.
+
+    Their sum is the buoyant weight and what both phases gain in momentum, also while a sediment grows within the
+    lowest cells. A straight line through the pressures of the two lowest cells has up to 3 % more.
+    """
+    laws = {"laws.lubrication": "none", "laws.drag": "wen_yu", "laws.model": model}
+    simulation = Simulation(Case.from_text(SETTLING, "c.toml", laws))
+    particles, fluid = simulation.particles, simulation.fluid
+    weight = 9.81 * 100.0 * float(particles.volume.sum()) / 0.012**2
+
+    def upward_momentum() -> float:
+        of_fluid = fluid.density * fluid.mean_voidage * fluid.mean_velocity[..., 2] * fluid.grid.cell_volume
+        return float((particles.mass * particles.velocity[:, 2]).sum() + of_fluid.sum()) / 0.012**2
+
+    lying = []
+    for end in (0.4, 0.6, 0.8, 1.0, 1.2):
+        simulation.until(end - 0.05)
+        begin, before, carried, load = simulation.time, upward_momentum(), [], wall_load(simulation)
+        while simulation.time < end - 1e-9:
+            earlier = load
+            simulation.step()
+            load = wall_load(simulation)
+            carried.append(pressure_drop(simulation) + 0.5 * (earlier + load))
+        lying.append(load / weight)
+        gained = (upward_momentum() - before) / (simulation.time - begin)
+        balance = (float(np.mean(carried)) - gained) / weight
+        print(f"{end} s: {lying[-1]:.2f} of the weight lies, balance {balance:.4f}")
+        assert balance == pytest.approx(1.0, abs=2e-3)
+    assert lying[-1] > lying[0] + 0.1
