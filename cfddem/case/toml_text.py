@@ -19,6 +19,10 @@ DEEPEST_KEY = 20
 
 def read_text(path: Path) -> str:
     """Text of a case file."""
+    if "\n" in str(path):
+        first = next(filter(None, (line.strip() for line in str(path).splitlines())), "")
+        remedy = f"this is a text that begins with {first[:40]!r}; Case.from_text reads one"
+        raise InputError("path", None, "the name of a case file", remedy)
     try:
         with path.open("rb") as file:
             content = file.read(LONGEST_FILE + 1)

@@ -171,6 +171,11 @@ def test_an_unreadable_file_is_refused(tmp_path: Path) -> None:
             Case.from_toml(path)
 
 
+def test_a_text_in_the_place_of_a_file_is_told_apart() -> None:
+    with pytest.raises(InputError, match=r"path: must be the name of a case file; .*Case\.from_text reads one"):
+        Case.from_toml(TEXT)
+
+
 def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path: Path) -> None:
     path = tmp_path / "bed.toml"
     path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
