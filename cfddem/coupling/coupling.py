@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SharpFlowSampler
-from cfddem.coupling.terms import CouplingTerms, ForceTerms, inertia, total
+from cfddem.coupling.terms import CouplingTerms, ForceList, ForceTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver

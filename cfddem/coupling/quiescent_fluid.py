@@ -15,13 +15,11 @@ from typing import Literal
 import numpy as np
 
 from cfddem.backend.errors import InputError
-from cfddem.coupling.force_list import ForceList
-from cfddem.coupling.forces.drag import Drag
+from cfddem.coupling.forces.drag import Drag, WallDrag
 from cfddem.coupling.forces.history import History
 from cfddem.coupling.forces.pressure import Weight
-from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.sampled_flow import SampledFlow
-from cfddem.coupling.terms import ForceTerms, total
+from cfddem.coupling.terms import ForceList, ForceTerms, total
 from cfddem.coupling.transfer import after_source, implicit_coefficients
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce

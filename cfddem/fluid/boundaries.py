@@ -374,3 +374,22 @@ def fill_side(velocity, axis, high, n, wall, mirror, outlet):
                     k, j, i = place(axis, last + out * (depth + 1), a, b)
                     kk, jj, ii = place(axis, before if depth else last, a, b)
                     velocity[component, k, j, i] = mirror[a, b] * leaves * velocity[component, kk, jj, ii] + fixed
+
+
+def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:
+    """Raise `InputError` if the steady inflow has no outlet to leave through."""
+    if boundaries.has_outlet:
+        return
+    grid, boundaries = grid.whole, boundaries.box
+    net, gross = 0.0, 0.0
+    for side in boundaries.sides:
+        for number in side.inlets:
+            here = side.owner == number
+            speed = boundaries.superficial(side, number, here, 0.0, steady=True)[:, side.axis]
+            net += float((speed * side.inward).sum()) * grid.face_area(side.axis)  # local: inlets of the whole box
+            gross += float(np.abs(speed).sum()) * grid.face_area(side.axis)  # local: inlets of the whole box
+    if abs(net) > 1e-9 * gross:
+        raise InputError(
+            "boundaries", None, "such that what flows in can leave",
+            f"{net:.3g} m3/s enter and no side is an outlet; add Outlet() to one",
+        )  # fmt: skip

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
+from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
-from cfddem.fluid import group_loops as loops
 from cfddem.fluid.block import owners
 from cfddem.fluid.cut_cells import CutCells, cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
@@ -116,7 +116,7 @@ class Groups:
         """
         at, count = self.at if at is None else at, len(self._large)
         if self._communicator.size == 1:
-            loops.put_means(at, self._group, count, shares, self.total, fields)
+            put_group_means(at, self._group, count, shares, self.total, fields)
             return
         members = self._exchanged(fields.take(at, axis=1) * shares, self._sent, self._received, len(self._group))
         sums = [np.bincount(self._group, weights=field, minlength=count) for field in members]
@@ -129,7 +129,7 @@ class Groups:
         """
         at = self.at if at is None else at
         if self._communicator.size == 1:
-            loops.put_copies(at, at[self._large][self._group], divisor, fields)
+            put_group_copies(at, at[self._large][self._group], divisor, fields)
             return
         self._put(fields, self._to_members(fields.take(at, axis=1)[:, self._large]) / divisor, at)
 
@@ -235,3 +235,36 @@ class CutGroups(SingleCells):
 def cell_groups(fluid: FluidSolver) -> SingleCells:
     """The groups of the cells of a fluid."""
     return CutGroups(fluid) if fluid.grid.walls else SingleCells(fluid)
+
+
+# ---------------------------------------------------------------- loops over the cells of groups
+
+
+@serial
+def put_group_means(at, group, count, shares, total, fields):
+    """Make fields (m, cells) their means over groups, in all cells of these.
+
+    at      cells of groups (n,), the group of each, and the number of groups
+    shares  weights of these cells, whose sum over the group of each is `total` (n,)
+    """
+    sums = np.empty(count)
+    for m in range(fields.shape[0]):
+        sums[:] = 0.0
+        for i in range(at.size):
+            sums[group[i]] += fields[m, at[i]] * shares[i]
+        for i in range(at.size):
+            fields[m, at[i]] = sums[group[i]] / total[i]
+
+
+@serial
+def put_group_copies(at, large, divisor, fields):
+    """Give all cells of groups the value of their large cell in fields (m, cells), over a divisor.
+
+    at, large  cells of groups, and the large cell of each (n,)
+    """
+    values = np.empty(at.size)
+    for m in range(fields.shape[0]):
+        for i in range(at.size):
+            values[i] = fields[m, large[i]] / divisor[i]
+        for i in range(at.size):
+            fields[m, at[i]] = values[i]

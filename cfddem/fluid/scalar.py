@@ -29,6 +29,7 @@ from cfddem.backend.errors import RunFailed
 from cfddem.fluid.cell_groups import cell_groups
 from cfddem.fluid.fields import CellField, CellFields
 from cfddem.fluid.grid import Array
+from cfddem.fluid.scalar_boundaries import SideFaces, scalar_walls
 from cfddem.fluid.scalar_conditions import SOLID, ScalarSides
 from cfddem.fluid.scalar_loops import (
     Carried,
@@ -46,8 +47,6 @@ from cfddem.fluid.scalar_loops import (
     take_exchange,
     volume_fluxes,
 )
-from cfddem.fluid.scalar_sides import SideFaces
-from cfddem.fluid.scalar_walls import scalar_walls
 from cfddem.fluid.solver import FluidSolver
 
 FOLLOW = 0.05

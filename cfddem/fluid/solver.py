@@ -27,16 +27,21 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
-from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.checks import checked_field, checked_viscosity, checked_voidage, refuse_trapped_inflow
+from cfddem.fluid.boundaries import Boundaries, refuse_trapped_inflow
 from cfddem.fluid.conditions import Condition
-from cfddem.fluid.fields import FLUID_FIELDS, CellFields
+from cfddem.fluid.fields import (
+    FLUID_FIELDS,
+    CellFields,
+    FluidStretches,
+    checked_field,
+    checked_viscosity,
+    checked_voidage,
+)
 from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import Balance, FlowRates, Medium, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
-from cfddem.fluid.stretches import FluidStretches
 from cfddem.fluid.viscosity import EffectiveViscosity
 
 LOOSE = 1e-6

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from cfddem.case.bed import Species
 from cfddem.case.feeds import fed_count
 from cfddem.case.schema import Case
-from cfddem.coupling.fluid_step_limits import courant_step, fluid_step_limits
 from cfddem.fluid.cell_counts import cell_counts
-from cfddem.fluid.step_limit import VISCOUS
+from cfddem.fluid.step_limit import VISCOUS, courant_step, fluid_step_limits
 from cfddem.particles.step_criteria import TimeScales, crossing_step
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.collision_estimate import pair_row, reduced

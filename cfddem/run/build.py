@@ -23,11 +23,10 @@ from cfddem.case.vessel_surface import corners_in
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import Agitation, FluctuatingForce, PseudoTurbulence
-from cfddem.coupling.forces.drag import Drag
+from cfddem.coupling.forces.drag import Drag, WallDrag
 from cfddem.coupling.forces.history import History
 from cfddem.coupling.forces.lift import Lift, Torque
 from cfddem.coupling.forces.pressure import PressureForce, ViscousStress, Weight
-from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.sampled_flow import change_along
 from cfddem.coupling.self_disturbance import SelfDisturbance

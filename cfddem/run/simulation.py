@@ -16,8 +16,7 @@ from cfddem.backend.launch import keep_freed_memory
 from cfddem.backend.portions import Portions, rows_by_id
 from cfddem.case.schema import Case
 from cfddem.coupling.coupling import Coupling, Uncoupled
-from cfddem.coupling.force_list import require_features
-from cfddem.coupling.terms import ForceTerms
+from cfddem.coupling.terms import ForceTerms, require_features
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce

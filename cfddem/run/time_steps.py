@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
-from cfddem.coupling.fluid_step_limits import COURANT, courant_step, crossing_rate, fluid_step_limits
 from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.step_limit import COURANT, courant_step, crossing_rate, fluid_step_limits
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.time_scales import check_step
 

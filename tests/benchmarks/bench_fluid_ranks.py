@@ -20,8 +20,8 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.launch import communicator as launched
 from cfddem.fluid.block import Block, divide
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
+from cfddem.fluid.pressure.multigrid import ClosedRegions
 from cfddem.fluid.pressure.ranks import pressure_equation
-from cfddem.fluid.pressure.regions import ClosedRegions
 
 CASES: dict[str, dict[str, Any]] = {
     "64 x 64 x 64": {"cells": (64, 64, 64)},

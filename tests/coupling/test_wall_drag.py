@@ -11,13 +11,12 @@ from scipy.optimize import brentq
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.coupling.forces.wall_drag import CLOSEST, WallDrag
+from cfddem.coupling.forces.drag import CLOSEST, WallDrag
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.resistance_by_direction import Directions
 from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
 from cfddem.coupling.self_disturbance_tables import MODES, tables_of
 from cfddem.coupling.self_disturbance_walls import FARTHEST, PLACES, OwnSolids, flow_beside, solid_beside
-from cfddem.coupling.transfer import after_source, implicit_coefficients
+from cfddem.coupling.transfer import Directions, after_source, implicit_coefficients
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.surfaces import Plane as SmoothPlane

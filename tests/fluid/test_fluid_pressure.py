@@ -14,8 +14,7 @@ from scipy.sparse.linalg import spsolve
 from cfddem.backend.communicator import SERIAL
 from cfddem.fluid import budgets
 from cfddem.fluid.grid import Grid, outside_cylinder
-from cfddem.fluid.pressure.multigrid import OVER_RELAXATION, PressureEquation
-from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.pressure.multigrid import OVER_RELAXATION, ClosedRegions, PressureEquation
 from cfddem.fluid.solver import FluidSolver
 
 

@@ -20,7 +20,7 @@ from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure import ranks as shared
-from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.pressure.multigrid import ClosedRegions
 from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import turned
 from cfddem.fluid.wall_force import loads_on_walls

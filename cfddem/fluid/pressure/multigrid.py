@@ -6,8 +6,9 @@ In every cell, with a face coefficient a >= 0 between neighbours and an anchor d
 
 A coefficient of zero is a wall; a cell without any coefficient is solid and keeps p = 0, so that solid cells cost
 nothing. Arrays have no ghosts (:func:`cfddem.fluid.halo.neighbours`): the low face of the first cell is the periodic
-face, and its coefficient is zero where the box is not periodic. If no cell of a connected region is anchored, its mean
-pressure is free: the mean of b is removed there, and the pressure is returned with mean zero.
+face, and its coefficient is zero where the box is not periodic. If no cell of a connected region is anchored, the
+region is closed (:class:`ClosedRegions`): fluid that enters it must leave it again, and its mean pressure is free. The
+mean of b is removed there, and the pressure is returned with mean zero.
 
 Multigrid: cells are merged in pairs along the directions of strong coupling, and transfer is piecewise constant. Coarse
 coefficients are sums of the fine ones, halved across the merged direction, which compensates for the piecewise constant
@@ -23,16 +24,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import Threaded
-from cfddem.backend.errors import RunFailed
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.backend.exact_sums import put_together, unit_of
-from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.boundaries import Boundaries
+from cfddem.fluid.grid import HIGH, LOW, Array, Grid
 from cfddem.fluid.pressure.multigrid_loops import (
     apply,
     coarsen,
@@ -45,7 +48,6 @@ from cfddem.fluid.pressure.multigrid_loops import (
     split_products,
     take_diagonal,
 )
-from cfddem.fluid.pressure.regions import ClosedRegions
 
 STRONG = 0.3
 """Directions whose coupling exceeds this share of the strongest are coarsened together."""
@@ -266,3 +268,70 @@ def hierarchy(grid: Grid) -> list[tuple[tuple[int, int, int], NDArray[np.int64]]
             return levels
         shape = np.where(merge, -(-shape // 2), shape)
         width = np.where(merge, 2 * width, width)
+
+
+# ---------------------------------------------------------------- closed regions
+
+
+class ClosedRegions(NamedTuple):
+    """The closed regions of a grid."""
+
+    number: NDArray[np.int64]  # (nz, ny, nx) of the region of a cell, from 1; 0 outside of all
+    size: NDArray[np.int64]  # (regions + 1,) cells of each region on all ranks
+    communicator: Communicator
+
+    @classmethod
+    def numbered(cls, number: NDArray[np.int64], communicator: Communicator) -> ClosedRegions | None:
+        """Regions by the number of each cell; None if there are none."""
+        count = int(communicator.largest(number))
+        if count == 0:
+            return None
+        size = communicator.sum(np.bincount(number.ravel(), minlength=count + 1), axis=())
+        return cls(number, size, communicator)
+
+    @classmethod
+    def of(cls, grid: Grid, boundaries: Boundaries, communicator: Communicator) -> ClosedRegions | None:
+        """Closed regions of a grid with its boundaries; None if an outlet touches every region."""
+        region, count = label(grid.whole.open)
+        links = list(range(count + 1))
+
+        def root(n: int) -> int:
+            while links[n] != n:
+                n = links[n]
+            return n
+
+        for axis in range(3):
+            if boundaries.periodic[axis]:
+                first, last = np.take(region, 0, 2 - axis).ravel(), np.take(region, -1, 2 - axis).ravel()
+                for a, b in {(int(a), int(b)) for a, b in zip(first, last) if a and b}:
+                    links[root(a)] = root(b)
+        region = np.array([root(n) for n in range(count + 1)])[region]
+        for side in boundaries.box.sides:
+            touched = side.layer(region, -1 if side.high else 0)[side.outlet[LOW:-HIGH, LOW:-HIGH]]
+            region[np.isin(region, touched[touched > 0])] = 0
+        return cls.numbered(grid.part(region).astype(np.int64), communicator)
+
+    def sums(self, values: Array) -> Array:
+        """Sum of a cell field (nz, ny, nx) over each region; the first sum is that of the cells outside of all."""
+        return np.array([self.communicator.sum(values[self.number == region]) for region in range(len(self.size))])
+
+    def remove_means(self, values: Array) -> None:
+        """Subtract from a cell field its mean over each region, in place."""
+        mean = self.sums(values) / np.maximum(self.size, 1)
+        mean[0] = 0.0
+        values -= mean[self.number]
+
+    def refuse_imbalance(self, missing: Array, scale: float, time: float) -> None:
+        """Raise `InputError` unless inflow and change of voidage cancel in each region.
+
+        missing  fluid that each cell lacks (nz, ny, nx) [m3/s]
+        scale    largest volume flux of the step [m3/s]
+        time     simulated time, for the message [s]
+        """
+        excess, size = self.sums(missing)[1:], self.sums(np.abs(missing))[1:]
+        for amount in excess[np.abs(excess) > 1e-9 * size + 1e-9 * scale]:
+            sign = "little" if amount > 0 else "much"
+            raise InputError(
+                "boundaries", None, "such that inflow and change of voidage cancel where there is no outlet",
+                f"{abs(amount):.3g} m3/s too {sign} fluid at t = {time:g} s; add Outlet()",
+            )  # fmt: skip

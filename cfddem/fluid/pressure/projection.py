@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import inline, prange, threaded, vector_inline
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.checks import refuse_nan
-from cfddem.fluid.fields import CellFields
+from cfddem.fluid.fields import CellFields, Stretches, refuse_nan
 from cfddem.fluid.grid import LOW, UNIT, Array, Grid
 from cfddem.fluid.momentum import line, strides
+from cfddem.fluid.pressure.multigrid import ClosedRegions
 from cfddem.fluid.pressure.ranks import pressure_equation
-from cfddem.fluid.pressure.regions import ClosedRegions
-from cfddem.fluid.stretches import Stretches
 
 
 class Projection:

@@ -21,8 +21,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.fluid.block import Block, region_of
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
-from cfddem.fluid.pressure.multigrid import Level, PressureEquation, hierarchy
-from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.pressure.multigrid import ClosedRegions, Level, PressureEquation, hierarchy
 
 SMALL = 5_000
 """Cells of the whole box below which every rank computes the whole level."""

@@ -26,7 +26,7 @@ from scipy.integrate import solve_ivp
 from cfddem.case.gallery import gallery
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
-from cfddem.coupling.forces.wall_drag import WallDrag
+from cfddem.coupling.forces.drag import WallDrag
 from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table

@@ -11,7 +11,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.case.materials import Material
-from cfddem.coupling.forces.wall_drag import WallDrag
+from cfddem.coupling.forces.drag import WallDrag
 from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.solver import ParticleSolver, SolverSettings
