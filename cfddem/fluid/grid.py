@@ -251,6 +251,16 @@ def _layer_and_share(coordinate, lowest, layers):
     return below - lowest, inside - below
 
 
+def at_points(grid: Grid, faces: Array, points: Array) -> Array:
+    """Tri-linear values of a padded field on faces (3, ...) at points (N, 3) [m]: (N, 3)."""
+    points = np.ascontiguousarray(points, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError("points", points.shape, "of shape (N, 3)")
+    values, origin, first = np.empty((len(points), 3)), np.array(grid.whole.origin), np.array(grid.first)
+    sample(faces, AT_FACES, points, origin, first, 1.0 / np.array(grid.spacing), values)
+    return values
+
+
 @threaded
 def sample(fields, place, points, origin, first, inverse_spacing, values):
     """Tri-linear values of padded fields at points.

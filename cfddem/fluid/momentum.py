@@ -41,7 +41,7 @@ import numpy as np
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import inline, prange, serial, threaded, vector_inline
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.grid import LOW, Array
+from cfddem.fluid.grid import LOW, Array, Grid
 from cfddem.fluid.step_limit import Rates
 
 # ---------------------------------------------------------------- terms, one function each
@@ -342,9 +342,18 @@ def drag_seen(balance, new, medium, step, weight, mean):
                 out_seen[i] = (low * u_low + high * u_high) / (low + high)
 
 
+def in_cells(grid: Grid, faces: Array, counted: Array) -> Array:
+    """Mean over the two faces of every cell (3, nz, ny, nx) of a padded field on faces.
+
+    counted  1 for faces that count, 0 for those that take the value of the other one; padded
+    """
+    cells = np.empty_like(faces)
+    _in_cells(faces, counted, cells)
+    return grid.inner(cells)
+
+
 @threaded
-def in_cells(faces, counted, cells):
-    """Mean over the two faces of every cell (3, ...); a face that does not count takes the value of the other."""
+def _in_cells(faces, counted, cells):
     shape, steps = counted.shape[1:], strides(counted.shape[1:])
     faces, counted, cells = faces.reshape(3, -1), counted.reshape(3, -1), cells.reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):

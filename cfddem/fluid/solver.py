@@ -37,7 +37,7 @@ from cfddem.fluid.fields import (
     checked_viscosity,
     checked_voidage,
 )
-from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
+from cfddem.fluid.grid import Array, Grid, at_points, on_faces
 from cfddem.fluid.momentum import Balance, FlowRates, Medium, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
@@ -394,13 +394,13 @@ class FluidSolver:
     @property
     def velocity(self) -> Array:
         """Velocity at cell centres (nz, ny, nx, 3) [m/s], mean of the two faces of each component."""
-        return np.moveaxis(self._in_cells(self.fields.velocity, self._every_face), 0, -1)
+        return np.moveaxis(in_cells(self.grid, self.fields.velocity, self._every_face), 0, -1)
 
     @property
     def mean_velocity(self) -> Array:
         """Mean of the velocities before and after the last step at cell centres (nz, ny, nx, 3) [m/s]."""
         other, now = self.fields.other_velocity, self.fields.velocity
-        return np.moveaxis(self._in_cells(0.5 * (other + now), self._every_face), 0, -1)
+        return np.moveaxis(in_cells(self.grid, 0.5 * (other + now), self._every_face), 0, -1)
 
     @property
     def voidage(self) -> Array:
@@ -463,20 +463,20 @@ class FluidSolver:
         self.boundaries.set_inlets(self.time, fields.mean_voidage)
         self.boundaries.fill_velocity(fields.velocity)
 
-    # ------------------------------------------------------------ values in cells
+    # ------------------------------------------------------------ values in cells and at points
 
     def cell_pressure_gradient(self) -> Array:
         """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m].
 
         Add rho g for the gradient of the static pressure.
         """
-        return self._in_cells(self.boundaries.pressure_gradient(self.fields.pressure), self.faces.solved)
+        return in_cells(self.grid, self.boundaries.pressure_gradient(self.fields.pressure), self.faces.solved)
 
     def cell_viscous_force(self) -> Array:
         """div tau of every cell, the stress of the fluid between the particles (not times eps), mean of its two faces
         (3, nz, ny, nx) [N/m3]."""
         velocity = self.fields.velocity
-        return self._in_cells(self.viscous_force(velocity, np.ones_like(velocity[0])), self.faces.solved)
+        return in_cells(self.grid, self.viscous_force(velocity, np.ones_like(velocity[0])), self.faces.solved)
 
     def drag_response(self) -> tuple[Array, Array]:
         """How the implicit drag of the last step saw the fluid, cell by cell.
@@ -488,28 +488,12 @@ class FluidSolver:
         drag_seen(self._balance(fields.other_velocity), fields.velocity, self._medium, self.last_step, weight, mean)
         return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(mean), 0, -1)
 
-    def _in_cells(self, faces: Array, counted: Array) -> Array:
-        """Mean over the two faces of every cell (3, nz, ny, nx).
-
-        counted  1 for faces that count, 0 for those that take the value of the other one
-        """
-        cells = np.empty_like(faces)
-        in_cells(faces, counted, cells)
-        return self.grid.inner(cells)
-
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:
         """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
         force, still = np.zeros_like(velocity), self._medium._replace(density=0.0, central=0.0)  # without convection
         self._find_explicit_force(velocity, voidage, force, still)
         return force
 
-    # ------------------------------------------------------------ values at points
-
     def velocity_at(self, points: Array) -> Array:
         """Velocity at points (N, 3) [m], tri-linear between faces: (N, 3) [m/s]."""
-        points = np.ascontiguousarray(points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise InputError("points", points.shape, "of shape (N, 3)")
-        values, origin = np.empty((len(points), 3)), np.array(self.grid.whole.origin)
-        sample(self.fields.velocity, AT_FACES, points, origin, np.array(self.grid.first), self.inverse_spacing, values)
-        return values
+        return at_points(self.grid, self.fields.velocity, points)
