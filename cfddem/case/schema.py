@@ -25,7 +25,7 @@ from cfddem.case.materials import Material, check_pairs, unknown_materials
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
-from cfddem.case.vessel_surface import refuse_openings
+from cfddem.case.vessel_shape import refuse_openings
 from cfddem.case.walls import place_of, walls_in
 from closures.agitation import SHARES, TIMES, AgitationFactors, free_spheres
 from closures.kinds import BUILT_IN

@@ -16,8 +16,7 @@ from cfddem.case.compare import CaseData
 from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
 from cfddem.case.patches import ENDS, CasePatch, lengths_of, open_area_of
-from cfddem.case.vessel_shape import CaseVessel, Line
-from cfddem.case.vessel_surface import area_of_end, surface_in
+from cfddem.case.vessel_shape import CaseVessel, Line, area_of_end, surface_in
 from cfddem.case.walls import CaseWall
 
 

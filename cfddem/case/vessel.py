@@ -13,8 +13,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Point
 from cfddem.case.tables import CaseTables, Column
-from cfddem.case.vessel_shape import Line
-from cfddem.case.vessel_surface import start_box_in, surface_in
+from cfddem.case.vessel_shape import Line, start_box_in, surface_in
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.triangles import signed_volume
 from cfddem.model.triangles import Array, inside_surface

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from cfddem.backend.brick_shapes import parsed
+from cfddem.backend.communicator import parsed
 from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
 from cfddem.backend.law_choice import import_laws

@@ -14,8 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, NoReturn
 
-from cfddem.backend.brick_shapes import parsed
-from cfddem.backend.communicator import Communicator
+from cfddem.backend.communicator import Communicator, parsed
 from cfddem.backend.errors import InputError, failure_elsewhere
 from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, python_command, require_mpi4py
 from cfddem.cli.json_output import asked_for_json, print_failure

@@ -1,9 +1,12 @@
-"""Keys of the table `[evaporation]`: water on particles, or drops of it, in humid air of one state."""
+"""Keys of the tables `[vapour]` and `[evaporation]`: one vapour in the fluid, and water on particles, or drops of it.
+
+Water evaporates into humid air of one state, or into the vapour of the fluid.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -11,8 +14,8 @@ from pydantic import Field
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable, Findings, Numbers
+from cfddem.case.patches import refuse_no_inlets
 from cfddem.features.heat_keys import GROUP, Heat, given_or, transfer_number
-from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
     saturation_pressure,
     vapour_diffusivity,
@@ -21,6 +24,50 @@ from closures.evaporation import (
     wet_bulb_temperature,
 )
 from closures.heat_transfer import ranz_marshall
+
+Fraction = Annotated[float, Field(ge=0, lt=1)]
+
+
+class VapourTable(FeatureTable):
+    """One vapour in the fluid, as a mass fraction in every cell."""
+
+    table: ClassVar[str] = "vapour"
+    meaning: ClassVar[str] = "one vapour in the fluid, as a mass fraction in every cell"
+
+    fluid_fraction: Fraction = Field(0.0, description="mass fraction of the vapour in the fluid at the start [-]")
+    inlet_fraction: Fraction | None = Field(
+        None, description="mass fraction in the fluid that enters; default: fluid_fraction [-]"
+    )
+    patch_fraction: dict[str, Fraction] = Field(
+        {}, description="mass fraction in the fluid that enters through an inlet, by the name of its [patch.NAME] [-]"
+    )
+    outlet_fraction: Fraction | None = Field(
+        None, description="mass fraction in fluid that flows back through the outlet; default: that of the cell [-]"
+    )
+    diffusivity: Positive = Field(description="diffusivity of the vapour in the fluid [m2/s]")
+    effective_diffusivity: Literal["none", "zehner_schluender"] = Field(
+        "none", description="diffusivity between particles: none, voidage times diffusivity; or the law"
+    )
+
+    @property
+    def inflow(self) -> float:
+        """Mass fraction in the fluid that enters [-]."""
+        return given_or(self.inlet_fraction, self.fluid_fraction)
+
+    def refuse(self, case: Any) -> None:
+        """Refuse a vapour in a fluid without a temperature in its cells."""
+        heat = Heat.of(case)
+        if not heat:
+            remedy = "add the table [heat], which says what evaporation cools"
+            raise InputError("vapour", None, "left out without [heat]", remedy)
+        if not heat.in_cells(case):
+            remedy = 'set heat.fluid = "cells", with a law of drag'
+            raise InputError("vapour", None, "left out where the fluid has one temperature", remedy)
+        refuse_no_inlets(case, "vapour.patch_fraction", self.patch_fraction, "vapour.outlet_fraction")
+
+
+# ---------------------------------------------------------------- evaporation
+
 
 SATURATED = 1.01
 """Relative humidity up to which air counts as saturated [-]."""

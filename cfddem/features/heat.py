@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.portions import Portions
-from cfddem.case.patch_faces import brought_in
+from cfddem.case.column_grid import brought_in
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
 from cfddem.features.case_feature import CaseFeature, Measured

@@ -12,8 +12,13 @@ from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.model.fields import Field
-from cfddem.particles.agglomerates import AgglomerateSizes, agglomerates, carried_liquid, summary
-from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.interactions.bridge_view import (
+    AgglomerateSizes,
+    Bridges,
+    agglomerate_sizes,
+    agglomerates,
+    carried_liquid,
+)
 from cfddem.particles.solver import ParticleSolver
 
 CARRIED = Field(
@@ -157,7 +162,7 @@ def _bridges_per_particle(_: Any, simulation: Any) -> float:
 
 def _sizes(simulation: Any) -> AgglomerateSizes:
     first, second, _ = _joined(simulation.particle_solver, bonds=True)
-    return summary(first, second, len(_ids(simulation.particle_solver)))
+    return agglomerate_sizes(first, second, len(_ids(simulation.particle_solver)))
 
 
 def _has_bonds(case: Case) -> bool:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.portions import Portions
-from cfddem.case.patch_faces import brought_in
+from cfddem.case.column_grid import brought_in
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw
 from cfddem.features.case_feature import CaseFeature, Measured
-from cfddem.features.vapour_keys import VapourTable
+from cfddem.features.evaporation_keys import VapourTable
 from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind

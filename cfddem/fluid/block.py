@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.brick_shapes import Shape, place_of, shapes, with_ghosts
-from cfddem.backend.communicator import Communicator
+from cfddem.backend.communicator import Communicator, Shape, place_of, shapes, with_ghosts
 from cfddem.backend.errors import InputError
 from cfddem.backend.portions import LARGEST, Parts, Portions
 from cfddem.fluid.grid import HIGH, Array, Grid

@@ -17,8 +17,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.backend.portions import Portions
-from cfddem.io.damage import ArrayFile, memory, opened
-from cfddem.io.files import disk_error, put, reason, require_format, write_hdf5
+from cfddem.io.files import ArrayFile, disk_error, memory, opened, put, reason, require_format, write_hdf5
 
 FORMAT = 4
 """Format of checkpoints. Checkpoints of any other format are refused."""

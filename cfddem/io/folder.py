@@ -19,8 +19,18 @@ from cfddem.backend.errors import InputError
 from cfddem.case import compare
 from cfddem.case.schema import Case
 from cfddem.case.walls import copy_of, with_surfaces
-from cfddem.io.damage import damage_named, opened, require_about, require_columns
-from cfddem.io.files import disk_error, lock_file, reason, require_format, require_no_links, write_whole
+from cfddem.io.files import (
+    damage_named,
+    disk_error,
+    lock_file,
+    opened,
+    reason,
+    require_about,
+    require_columns,
+    require_format,
+    require_no_links,
+    write_whole,
+)
 from cfddem.io.index import POINTS, Layout, Snapshot
 
 FORMAT = 2

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError
-from cfddem.io.damage import opened
-from cfddem.io.files import hdf5_in_memory
+from cfddem.io.files import hdf5_in_memory, opened
 from cfddem.io.quantities import TIME, Quantities, Quantity, declared
 
 POINTS = "Points"

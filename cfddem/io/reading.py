@@ -19,7 +19,7 @@ import numpy as np
 from cfddem.backend import html
 from cfddem.backend.errors import InputError, RunFailed, library, nearest
 from cfddem.case.toml_text import read_text
-from cfddem.io.damage import ArrayFile, opened, require_cells, require_columns, require_particles
+from cfddem.io.files import ArrayFile, opened, require_cells, require_columns, require_particles
 from cfddem.io.folder import AVERAGES_FROM, NUMBERED, read_about, read_columns, read_snapshot_header
 from cfddem.io.index import POINTS, GridBox, Snapshot, field_name, listed
 from cfddem.io.quantities import Quantity, declared, from_json, shown_unit

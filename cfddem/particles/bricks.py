@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.brick_shapes import Shape, shapes
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import SERIAL, Communicator, Shape, shapes
 
 BINS = 1000
 """Places among which a plane between two ranks is chosen, in each layer or column."""

@@ -13,7 +13,7 @@ from cfddem.case.column_grid import grid_of
 from cfddem.case.liquid import Spray
 from cfddem.case.patches import ENDS, PLANES, CasePatch, lengths_of, middle_of
 from cfddem.case.schema import Case
-from cfddem.case.vessel_surface import outline
+from cfddem.case.vessel_shape import outline
 from cfddem.case.walls import CaseWall
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank
 from cfddem.preflight.bed_estimate import estimate_bed

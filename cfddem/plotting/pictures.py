@@ -19,7 +19,7 @@ from cfddem.io.files import PARTIAL
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, ORANGE, SKY, blank, save
-from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
+from cfddem.plotting.rendering import add_walls, walls_of, with_walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,7 +18,7 @@ from cfddem.io.quantities import declared, shown_unit
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.pictures import SOLID, bounds_of, depth_of, limits_of_fluid, spread_over
-from cfddem.plotting.wall_surfaces import add_walls, walls_of
+from cfddem.plotting.rendering import add_walls, walls_of
 
 NOTHING = "none"
 """Choice of a layer or a colour that is not drawn."""

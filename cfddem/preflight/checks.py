@@ -11,7 +11,7 @@ from cfddem.case.compare import Points, held, points_of, require_measured_unit, 
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.bed_waves import check_waves
-from cfddem.preflight.collision_estimate import CollisionEstimate
+from cfddem.preflight.collision_estimate import CollisionEstimate, WetEstimate, check_wet
 from cfddem.preflight.expansion import check_expansion
 from cfddem.preflight.flow_checks import check_cells, check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import (
@@ -30,7 +30,6 @@ from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, round
 from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate, available_memory, estimate_cost, estimate_steps
 from cfddem.preflight.wall_checks import check_walls_and_feeds
-from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
 SOFT_OVERLAP, NOTED_OVERLAP, LARGEST_OVERLAP = 0.02, 0.04, 0.1
 """Overlap over the diameter: above the first a warning, above the last an error [-].

@@ -19,10 +19,9 @@ from cfddem.fluid.cell_counts import cell_counts
 from cfddem.model.triangles import is_closed
 from cfddem.preflight.accuracy import accuracy
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
-from cfddem.preflight.collision_estimate import CollisionEstimate
+from cfddem.preflight.collision_estimate import CollisionEstimate, WetEstimate
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate
 from cfddem.preflight.wall_checks import MOST_CELLS, area_by_cells, closed_cells, largest_rate
-from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 from closures.bed import ergun_gradient
 

@@ -24,13 +24,12 @@ from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
-from cfddem.preflight.collision_estimate import estimate_collision, pair_row, reduced
+from cfddem.preflight.collision_estimate import estimate_collision, estimate_wet, pair_row, reduced
 from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import check_length, check_particle_size, fits
 from cfddem.preflight.issue import ORDER, Issue, Severity
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
-from cfddem.preflight.wet_estimate import estimate_wet
 from closures import registry
 from closures.check import check as check_law
 

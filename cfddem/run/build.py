@@ -11,15 +11,14 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.case.bed import Jet, at_times
-from cfddem.case.column_grid import grid_of, open_floor
+from cfddem.case.column_grid import SIDE_OF, face_at, grid_of, open_floor, patch_faces
 from cfddem.case.liquid import Bond
 from cfddem.case.materials import pair_overrides
 from cfddem.case.particle_properties import SPECIES
-from cfddem.case.patch_faces import SIDE_OF, face_at, patch_faces
 from cfddem.case.patches import PLANES
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
-from cfddem.case.vessel_surface import corners_in
+from cfddem.case.vessel_shape import corners_in
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import Agitation, FluctuatingForce, PseudoTurbulence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from cfddem.backend.brick_shapes import Shape
+from cfddem.backend.communicator import Shape
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.preflight.checks import check_quantities

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_up_run import BED, made_up
 
-from cfddem.analysis.defluidisation import defluidisation, defluidisation_of
+from cfddem.analysis.run_warnings import defluidisation, defluidisation_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import rooms  # noqa: F401
 from test_ghosts import DRY, GLASS
 
-from cfddem.backend.brick_shapes import Shape, place_of
+from cfddem.backend.communicator import Shape, place_of
 from cfddem.backend.compile import use_threads
 from cfddem.backend.mpi import Ranks
 from cfddem.particles.bricks import Bricks

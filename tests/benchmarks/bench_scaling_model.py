@@ -26,8 +26,7 @@ from in_process_ranks import Rank, on_ranks
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.case.schema import Case
-from cfddem.preflight.weak_scaling import Machine, RunCost, Shares, time_of_a_rank
-from cfddem.run.division import cost_of, expected_shares
+from cfddem.run.division import Machine, RunCost, Shares, cost_of, expected_shares, time_of_a_rank
 from cfddem.run.simulation import Simulation
 
 CASES = {

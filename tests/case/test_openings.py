@@ -11,11 +11,10 @@ import pytest
 from example_case import GLASS
 
 from cfddem.backend.errors import InputError
-from cfddem.case.column_grid import grid_of
-from cfddem.case.patch_faces import patch_faces
+from cfddem.case.column_grid import grid_of, patch_faces
 from cfddem.case.patches import CasePatch
 from cfddem.case.schema import Case
-from cfddem.case.vessel_surface import outline, overlap
+from cfddem.case.vessel_shape import outline, overlap
 from cfddem.features.feeds import Opening
 from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.particles.state import make_particles

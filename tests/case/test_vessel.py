@@ -14,8 +14,7 @@ from command_line import call
 from example_case import GLASS
 
 from cfddem.backend.errors import InputError
-from cfddem.case.column_grid import grid_of
-from cfddem.case.patch_faces import coverage
+from cfddem.case.column_grid import coverage, grid_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import start_box, vessel_of
 from cfddem.fluid.boundaries import Boundaries

@@ -15,8 +15,7 @@ from in_process_ranks import on_ranks
 from test_case_walls import TETRAHEDRON, write_binary_stl
 
 from cfddem.backend import portions
-from cfddem.backend.brick_shapes import Shape, place_of
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import SERIAL, Communicator, Shape, place_of
 from cfddem.backend.errors import RunFailed
 from cfddem.backend.portions import collected
 from cfddem.case.schema import Case

@@ -14,8 +14,7 @@ from test_case_walls import write_binary_stl
 from test_coupling_ranks import advanced, assert_same_bits, begun, case_of
 from test_surfaces_of_triangles import revolved
 
-from cfddem.backend.brick_shapes import Shape
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import SERIAL, Communicator, Shape
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.self_disturbance_cut_cells import SolidsOfCells, WallsOfCells
 from cfddem.coupling.self_disturbance_tables import MODES

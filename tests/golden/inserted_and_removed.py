@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.particles import feeding
+from cfddem.features.feeds import Feed, ParticleOutlet
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.walls.shapes import Plane
@@ -31,7 +31,7 @@ def feed_and_outlet() -> State:
     run = particles([[0.0, 0.0, 0.02]], RADIUS, [BEAD], gravity=(0.0, 0.0, -9.81), walls=[Plane(point=(0, 0, 0.01))])
     sizes = np.random.default_rng(5)
     corner, size = (0.0, 0.0, 0.02), (3e-3, 3e-3, 1e-3)
-    feed = feeding.Feed(
+    feed = Feed(
         1e5,
         corner,
         size,
@@ -40,7 +40,7 @@ def feed_and_outlet() -> State:
         velocity=(0.0, 0.0, -1.0),
         seed=1,
     )
-    outlet = feeding.ParticleOutlet(low=(-np.inf, -np.inf, 0.0195))
+    outlet = ParticleOutlet(low=(-np.inf, -np.inf, 0.0195))
     for _ in range(12):
         feed(run)
         run.advance(2e-6, 50)

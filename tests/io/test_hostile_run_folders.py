@@ -14,7 +14,7 @@ from command_line import call
 from made_up_run import made_up
 
 from cfddem.backend.errors import CfddemError, RunFailed
-from cfddem.io import checkpoint, damage
+from cfddem.io import checkpoint, files
 from cfddem.io.reading import open_run
 from cfddem.io.writer import RunFolder
 
@@ -109,13 +109,13 @@ def test_zeros_that_are_compressed_most_are_read(tmp_path: Path) -> None:
     with h5py.File(path, "w") as file:
         file.create_dataset("zeros", data=np.zeros(30_000_000), compression="gzip", compression_opts=9, shuffle=True)
     assert path.stat().st_size < 30_000_000 * 8 / 500
-    with damage.opened(path) as data:
+    with files.opened(path) as data:
         assert not data.read(data.file["zeros"]).any()
 
 
 def test_an_array_larger_than_the_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_up(tmp_path / "run", rows=101)
-    monkeypatch.setattr(damage, "memory", lambda: 1000.0)
+    monkeypatch.setattr(files, "memory", lambda: 1000.0)
     with pytest.raises(RunFailed, match=r"the memory of this machine holds at most 1e.03"):
         _ = open_run(tmp_path / "run").history
 

@@ -9,10 +9,9 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.features.feeds import Feed, ParticleOutlet
 from cfddem.io import checkpoint
-from cfddem.particles.feeding import Feed, ParticleOutlet
-from cfddem.particles.initial.packing import normal, random_packing
-from cfddem.particles.initial.tables import read_particles
+from cfddem.particles.initial.packing import normal, random_packing, read_particles
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver, SolverSettings
 from cfddem.particles.state import make_particles

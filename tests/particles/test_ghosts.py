@@ -13,15 +13,14 @@ from example_case import TEXT as EXAMPLE
 from in_process_ranks import Rank, on_ranks
 from solver_options import grouped
 
-from cfddem.backend.brick_shapes import place_of
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import SERIAL, Communicator, place_of
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.backend.portions import collected
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
+from cfddem.features.feeds import Feed, ParticleOutlet
 from cfddem.particles import listing
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws

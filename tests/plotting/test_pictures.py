@@ -24,8 +24,8 @@ from cfddem.plotting import colours, rendering
 from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
 from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
+from cfddem.plotting.rendering import _moved, _surface, walls_of
 from cfddem.plotting.scene import Look, Scene, scene, window
-from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
 QUANTITIES = {

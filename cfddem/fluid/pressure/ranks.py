@@ -16,8 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.brick_shapes import place_of
-from cfddem.backend.communicator import Communicator
+from cfddem.backend.communicator import Communicator, place_of
 from cfddem.fluid.block import Block, region_of
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.particles.interactions.bond import SMALLEST_GAP
-from cfddem.particles.interactions.newton import next_guess
+from cfddem.particles.interactions.film_law import next_guess
 from cfddem.particles.interactions.slots import (
     BRIDGE_ENERGY,
     BRIDGE_POTENTIAL,

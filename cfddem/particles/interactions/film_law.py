@@ -16,7 +16,6 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.backend.law_set import bind_arguments, check_compiles, compile_source
-from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     POTENTIAL,
     SHORT_POTENTIAL,
@@ -179,6 +178,23 @@ def _short_integral(gap, end, film, least):
     a, b = max(gap, 0.0), max(end, 0.0)
     below = least * (b - a) * (b + a) * 0.5 / film.minimum_gap
     return inside if film.gap > film.minimum_gap else below
+
+
+@inline
+def next_guess(guess, excess, slope, low, high):
+    """Next guess for the root of an increasing function, and the bounds that hold it.
+
+    excess  value of the function at the guess
+    slope   of the function there
+    """
+    if excess > 0.0:
+        high = guess
+    else:
+        low = guess
+    following = guess - excess / slope
+    if not low < following < high:
+        following = 0.5 * (low + high)
+    return following, low, high
 
 
 @inline

@@ -21,9 +21,8 @@ import numpy as np
 
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
-from cfddem.features.evaporation_keys import Evaporation
+from cfddem.features.evaporation_keys import Evaporation, VapourTable
 from cfddem.features.heat_keys import Heat
-from cfddem.features.vapour_keys import VapourTable
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation

@@ -19,7 +19,7 @@ import numpy as np
 
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.analysis.bubbles import find_bubbles
-from cfddem.analysis.defluidisation import defluidisation_of
+from cfddem.analysis.run_warnings import defluidisation_of
 from cfddem.analysis.series import block_average
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError

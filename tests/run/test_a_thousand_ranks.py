@@ -8,8 +8,14 @@ from pathlib import Path
 import pytest
 
 from cfddem.case.schema import Case
-from cfddem.preflight.weak_scaling import efficiency, memory_of_a_rank, seconds_of_a_snapshot, time_of_a_rank
-from cfddem.run.division import cost_of, expected_shares
+from cfddem.run.division import (
+    cost_of,
+    efficiency,
+    expected_shares,
+    memory_of_a_rank,
+    seconds_of_a_snapshot,
+    time_of_a_rank,
+)
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/cluster.md").read_text(encoding="utf-8")
 
