@@ -11,13 +11,13 @@ division of space.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
-from cfddem.backend.compile import serial
+from cfddem.backend.compile import renamed, serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.portions import slices
@@ -26,11 +26,10 @@ from cfddem.particles.bricks import Bricks
 from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.interactions.bridge_changes import share_wall_liquid
 from cfddem.particles.interactions.joint_solution import (
-    MOST_ITERATIONS,
-    PASSES,
     along_direction,
     begin_solution,
     best_factor,
+    film_kick,
     finish_solution,
     new_direction,
     new_product,
@@ -306,7 +305,7 @@ class StepsWithGhosts:
         self.begin, self.start, self.move, self.find_bridge_changes, self.finish = (
             specialise(loop, choices, threads) for loop in loops
         )
-        self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
+        self.films = films_with_ghosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
         self.inertia, self.wet_walls = choices["BRIDGE_INERTIA"], choices.get("WALL_LIQUID")
         if self.wet_walls:
@@ -359,66 +358,51 @@ class StepsWithGhosts:
 
 
 # ---------------------------------------------------------------- films that are solved together
-#
-# Films that are solved together where several processes share the particles: one phase after the other.
 
 
-class FilmsWithGhosts:
-    """The loop of :func:`cfddem.particles.interactions.joint_solution.film_kick` on one rank of several.
+def films_with_ghosts(
+    choices: Mapping[str, Any], threads: bool, ghosts: SingleDomain, communicator: Communicator
+) -> Callable[[System, float], None]:
+    """:func:`cfddem.particles.interactions.joint_solution.film_kick` on one rank of several.
 
-    Arguments as of :class:`cfddem.particles.ghosts.StepsWithGhosts`.
+    It is run by Python, with compiled phases, between which ghosts receive what others have found; sums are those of
+    all ranks.
+
+    Arguments as of :class:`StepsWithGhosts`.
     """
+    loops = (start_films, begin_solution, new_residual, new_scale, new_direction, new_product, along_direction)
+    phases = {loop.__name__: specialise(loop, choices, threads) for loop in (*loops, finish_solution, units_of)}
 
-    def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Any, communicator: Communicator) -> None:
-        self.ghosts, self.communicator = ghosts, communicator
-        loops = (start_films, begin_solution, finish_solution, new_residual, new_scale)
-        more = (new_direction, new_product, along_direction, units_of)
-        compiled = [specialise(loop, choices, threads) for loop in (*loops, *more)]
-        self.start, self.begin, self.finish, self.new_residual, self.new_scale = compiled[: len(loops)]
-        self.new_direction, self.new_product, self.along, self.units_of = compiled[len(loops) :]
+    def refreshed(name: str, before: Phase | None = None, after: Phase | None = None) -> Callable[..., Any]:
+        """A phase with what ghosts receive before it or after it."""
 
-    def __call__(self, system: System, step: float) -> None:
-        """Arguments of `film_kick`."""
-        self.ghosts.refresh("film")
-        count, owned = self.start(system)
-        number = int(self.communicator.sum([owned]))
-        if number == 0:
-            return
-        tolerance = system.parameters.film_tolerance
-        self.begin(system, count, step)
-        self.ghosts.refresh("film_change")
-        iterations, passes = 0, 0
-        while passes < PASSES:
-            largest = self.new_residual(system, count, step, True)
-            by_wanted, by_residual = (self._total(system, count, number, column, largest) for column in (2, 3))
-            if by_wanted + by_residual < 0.0:
-                self.new_scale(system, count, best_factor.py_func(by_wanted, by_residual))
-                largest = self.new_residual(system, count, step, False)
-            left, whole = (self._total(system, count, number, column, largest) for column in (0, 1))
-            limit = tolerance * tolerance * whole
-            if settled.py_func(left, whole, limit, passes):
-                break
-            passes += 1
-            share, tops = 0.0, (0.0, 0.0)
-            for _ in range(MOST_ITERATIONS):
-                self.new_direction(system, count, share)
-                self.ghosts.refresh("film_direction")
-                product = self._total(system, count, number, 0, (self.new_product(system, count),))
-                tops = self.along(system, count, left / product, step)
-                before, left = left, self._total(system, count, number, 0, tops)
-                iterations += 1
-                share = left / before
-                if not left > limit:
-                    break
-            if not self._total(system, count, number, 1, tops) > limit:
-                break
-        self.finish(system, count)
-        system.film_counts[:] += (1.0, iterations, passes, owned)
+        def with_ghosts(*arguments: Any) -> Any:
+            if before:
+                ghosts.refresh(before)
+            result = phases[name](*arguments)
+            if after:
+                ghosts.refresh(after)
+            return result
 
-    def _total(self, system: System, count: int, number: int, column: int, tops: Sequence[float]) -> float:
-        """Sum of a column of the terms of all films on all ranks, see `total_of`; `tops`, the largest of each here."""
-        largest = self.communicator.largest([tops[column]])
+        return with_ghosts
+
+    def of_all_ranks(number: int) -> int:
+        return int(communicator.sum([number]))
+
+    def total_of(system: System, count: int, number: int, column: int, largest: float) -> float:
+        largest = communicator.largest([largest])
         if not 0.0 < largest < math.inf:
             return largest
         power = scale_of.py_func(largest, number)
-        return math.ldexp(float(self.communicator.sum([self.units_of(system, count, column, power)])), -power)
+        return math.ldexp(float(communicator.sum([phases["units_of"](system, count, column, power)])), -power)
+
+    on_ranks = phases | {
+        "start_films": refreshed("start_films", before="film"),
+        "begin_solution": refreshed("begin_solution", after="film_change"),
+        "new_direction": refreshed("new_direction", after="film_direction"),
+        "of_all_ranks": of_all_ranks,
+        "total_of": total_of,
+        "best_factor": best_factor.py_func,
+        "settled": settled.py_func,
+    }
+    return renamed(film_kick.py_func, "film_kick_with_ghosts", on_ranks)

@@ -195,33 +195,47 @@ def units_of(system, count, column, power):
 
 
 @serial
-def total_of(system, count, column, largest):
+def total_of(system, count, number, column, largest):
     """Sum of one of the four terms of all films.
 
-    largest  absolute value of these
+    number   of the films of all ranks
+    largest  absolute value of these terms
     """
     if not 0.0 < largest < math.inf:
         return largest
-    power = scale_of(largest, count)
+    power = scale_of(largest, number)
     return math.ldexp(float(units_of(system, count, column, power)), -power)
+
+
+@inline
+def of_all_ranks(number):
+    """Sum of a number over the ranks that share the particles; one process has all."""
+    return number
 
 
 @serial
 def film_kick(system, step):
-    """Give the particles the impulses of all films over the coming step."""
-    count, _ = start_films(system)
-    if count == 0:
+    """Give the particles the impulses of all films over the coming step.
+
+    Where several ranks share the particles, :func:`cfddem.particles.ghosts.films_with_ghosts` gives this loop other
+    functions of the same names.
+    """
+    count, owned = start_films(system)
+    number = of_all_ranks(owned)
+    if number == 0:
         return
     tolerance = system.parameters.film_tolerance
     begin_solution(system, count, step)
     iterations, passes = 0, 0
     while passes < PASSES:
         largest = new_residual(system, count, step, True)
-        by_wanted, by_residual = total_of(system, count, 2, largest[2]), total_of(system, count, 3, largest[3])
+        by_wanted = total_of(system, count, number, 2, largest[2])
+        by_residual = total_of(system, count, number, 3, largest[3])
         if by_wanted + by_residual < 0.0:  # these impulses could add energy; a part of them takes the most
             new_scale(system, count, best_factor(by_wanted, by_residual))
             largest = new_residual(system, count, step, False)
-        left, whole = total_of(system, count, 0, largest[0]), total_of(system, count, 1, largest[1])
+        left = total_of(system, count, number, 0, largest[0])
+        whole = total_of(system, count, number, 1, largest[1])
         limit = tolerance * tolerance * whole
         if settled(left, whole, limit, passes):
             break
@@ -229,21 +243,21 @@ def film_kick(system, step):
         share, top = 0.0, (0.0, 0.0)
         for _ in range(MOST_ITERATIONS):
             new_direction(system, count, share)
-            product = total_of(system, count, 0, new_product(system, count))
+            product = total_of(system, count, number, 0, new_product(system, count))
             top = along_direction(system, count, left / product, step)
-            before, left = left, total_of(system, count, 0, top[0])
+            before, left = left, total_of(system, count, number, 0, top[0])
             iterations += 1
             share = left / before
             if not left > limit:
                 break
-        if not total_of(system, count, 1, top[1]) > limit:
+        if not total_of(system, count, number, 1, top[1]) > limit:
             break
     finish_solution(system, count)
     counts = system.film_counts
     counts[0] += 1.0
     counts[1] += iterations
     counts[2] += passes
-    counts[3] += count
+    counts[3] += owned
 
 
 # ---------------------------------------------------------------- an iteration
