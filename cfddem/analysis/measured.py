@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.profiles import profiles_of
+from cfddem.analysis.layers import profiles_of
 from cfddem.analysis.series import block_average
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import at_times
@@ -30,7 +30,7 @@ from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 
 _ATTRIBUTES = {"voidage": "voidage", "granular_temperature": "temperature"}
-"""Names of profiles in :class:`cfddem.analysis.profiles.Profiles`."""
+"""Names of profiles in :class:`cfddem.analysis.layers.Profiles`."""
 
 
 @dataclass(frozen=True)

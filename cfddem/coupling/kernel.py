@@ -16,7 +16,7 @@ size, so that small particles among large ones exchange with their own surroundi
 are adjoint, and so are those of all together.
 
 Where several ranks share the grid, each deposits its own particles on the cells around them
-(:class:`cfddem.coupling.ghost_deposit.GhostDeposit`), which are then added to those of their owners; a gather takes
+(:class:`cfddem.coupling.kernel_cells.GhostDeposit`), which are then added to those of their owners; a gather takes
 them from there. Deposit and gather stay adjoint.
 """
 
@@ -32,8 +32,7 @@ from cfddem.backend.compile import get_num_threads
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
-from cfddem.coupling.ghost_deposit import GhostDeposit, sides_of
-from cfddem.coupling.merged_cells import merged_cells
+from cfddem.coupling.kernel_cells import GhostDeposit, merged_cells, sides_of
 from cfddem.fluid.grid import AT_CENTRES, HIGH, LOW, Array, Grid, sample
 from cfddem.fluid.halo import Halo
 from cfddem.particles.ghosts import SingleDomain
@@ -53,7 +52,7 @@ SLAB = 4
 class Stencil(NamedTuple):
     """Cells on which particles deposit: for each of their equal pieces a cell and the seven beside, above and behind.
 
-    A layer of cells around the grid takes part, see :class:`cfddem.coupling.ghost_deposit.GhostOwners`.
+    A layer of cells around the grid takes part, see :class:`cfddem.coupling.kernel_cells.GhostOwners`.
     """
 
     first: np.ndarray  # (N, pieces) uint32, flat index of the lowest of the eight cells

@@ -74,25 +74,9 @@ class Count(NamedTuple):
 def allocate_tally(engine: Engine) -> Count:
     """A count with all values 0, for the present particles and pairs."""
     number, count = len(engine.edges.first), engine.particles.count
-    ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
-    spring, stiffness, power, spring_energy, hysteresis_loss = np.zeros((5, number))
-    push, twist = np.zeros((2, number, 3))
+    of_particles, of_pairs, vectors_of_pairs = np.zeros((5, count, 3)), np.zeros((5, number)), np.zeros((2, number, 3))
     totals = np.zeros((2, CHUNKS, len(CHANNELS) + 2))
-    return Count(
-        ahead,
-        spin_ahead,
-        moved,
-        turned,
-        drifted,
-        spring,
-        stiffness,
-        power,
-        spring_energy,
-        hysteresis_loss,
-        push,
-        twist,
-        totals,
-    )
+    return Count._make([*of_particles, *of_pairs, *vectors_of_pairs, totals])
 
 
 class EnergyAccount(NamedTuple):

@@ -15,8 +15,8 @@ import numpy as np
 from cfddem.analysis.bed_laws import weight_over_floor
 from cfddem.analysis.comparison import compare, mean_of, relative
 from cfddem.analysis.fluctuations import impacts
+from cfddem.analysis.layers import FEWEST_TIMES, Profiles, layer_map, profiles_of, waves
 from cfddem.analysis.measured import MeasuredComparison, compared_with_measured, with_files
-from cfddem.analysis.profiles import Profiles, profiles_of
 from cfddem.analysis.report import case_of, recorded_regimes
 from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_text import (
@@ -34,7 +34,6 @@ from cfddem.analysis.report_text import (
 )
 from cfddem.analysis.report_values import KeyResult
 from cfddem.analysis.run_warnings import NOTE
-from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
 from cfddem.backend.errors import CfddemError, RunFailed
 from cfddem.backend.html import page_template
 from cfddem.case.compare import ABSCISSAE

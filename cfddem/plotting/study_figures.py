@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfddem.analysis.fluctuations import Impacts, maxwellian_impact_speed
+from cfddem.analysis.layers import LayerMap, Waves, layer_map, waves
 from cfddem.analysis.measures import bed_height
 from cfddem.analysis.report import case_of, window_of
-from cfddem.analysis.waves import LayerMap, Waves, layer_map, waves
 from cfddem.case.compare import ABSCISSAE, Points
 from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case

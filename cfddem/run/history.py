@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from cfddem.analysis import measures
-from cfddem.analysis.waves import FEWEST_LAYERS, LAYER
+from cfddem.analysis.layers import FEWEST_LAYERS, LAYER
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case

@@ -13,8 +13,8 @@ from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.comparison import compare, distinct_names, lines
 from cfddem.analysis.key_results import agreement
+from cfddem.analysis.layers import profiles_of
 from cfddem.analysis.measured import largest_chi2
-from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of, report
 from cfddem.analysis.report_text import lines as report_lines
 from cfddem.analysis.report_text import markdown

@@ -13,10 +13,10 @@ from example_case import TEXT
 
 from cfddem import open_run
 from cfddem.analysis.fluctuations import dispersion, impacts, maxwellian_impact_speed, spreading
+from cfddem.analysis.layers import LayerMap, waves
 from cfddem.analysis.measures import cells_of, granular_temperature, layer_solid_fraction
 from cfddem.analysis.report import report
 from cfddem.analysis.report_text import lines
-from cfddem.analysis.waves import LayerMap, waves
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.plotting.study_figures import wave_map

@@ -20,8 +20,8 @@ from cfddem.backend.errors import RunFailed
 from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.pressure import PressureForce
-from cfddem.coupling.ghost_deposit import GhostDeposit
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.kernel_cells import GhostDeposit
 from cfddem.features.heat import HeatExchange
 from cfddem.fluid.block import Block, Division, divide, region_of
 from cfddem.fluid.grid import Array, Grid
