@@ -140,20 +140,12 @@ def owners(grid: Grid) -> NDArray[np.int64]:
     return ranks
 
 
-def put_together(values: np.ndarray, starts: Starts, communicator: Communicator, faces: bool = False) -> np.ndarray:
-    """The array over the whole grid of which every rank has a part (..., nz, ny, nx).
-
-    faces  whether the array has one layer more than cells along each axis; that between ranks is taken from the upper
-    """
+def put_together(values: np.ndarray, starts: Starts, communicator: Communicator) -> np.ndarray:
+    """The array over the whole grid of which every rank has a part (..., nz, ny, nx)."""
     shape = len(starts[0]) - 1, len(starts[1]) - 1, len(starts[2]) - 1
-    whole = np.empty((*values.shape[:-3], *(int(begins[-1]) + faces for begins in starts[::-1])), values.dtype)
-    parts = []
-    for rank in range(communicator.size):
-        place = place_of(rank, shape)
-        last = [int(faces and n + 1 == ranks) for n, ranks in zip(place, shape)]
-        parts.append(whole[region_of(starts, place, last)])
-    nz, ny, nx = parts[communicator.rank].shape[-3:]
-    joined = communicator.joined(values[..., :nz, :ny, :nx].reshape(-1))
+    whole = np.empty((*values.shape[:-3], *(int(begins[-1]) for begins in starts[::-1])), values.dtype)
+    parts = [whole[region_of(starts, place_of(rank, shape))] for rank in range(communicator.size)]
+    joined = communicator.joined(values.reshape(-1))
     end = 0
     for part in parts:
         begin, end = end, end + part.size
@@ -277,6 +269,6 @@ class Block(Grid):
         own: np.ndarray = values[region_of(self.division.starts, self._place, (faces,) * 3)]
         return own
 
-    def joined(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
+    def joined(self, values: np.ndarray) -> np.ndarray:
         """The array over the whole grid of which every rank has a part (..., nz, ny, nx); the opposite of `part`."""
-        return put_together(values, self.division.starts, self.communicator, faces)
+        return put_together(values, self.division.starts, self.communicator)

@@ -148,7 +148,7 @@ class Grid:
         """The part of this grid in an array over the whole one (..., nz, ny, nx), as `Block.part`."""
         return values
 
-    def joined(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
+    def joined(self, values: np.ndarray) -> np.ndarray:
         """The array over the whole grid of which every rank has a part (..., nz, ny, nx), as `Block.joined`."""
         return values
 

@@ -55,6 +55,9 @@ STRONG = 0.3
 SMALL = 20_000
 """Cells below which a level runs on one thread: waking the others takes longer than the work."""
 
+MOST_ITERATIONS = 200
+"""Iterations after which a solution has failed."""
+
 SWEEPS = 2
 """Sweeps before and after each coarse correction."""
 
@@ -143,15 +146,13 @@ class PressureEquation:
         grid: Grid,
         closed_regions: ClosedRegions | None,
         communicator: Communicator = SERIAL,
-        most_iterations: int = 200,
         outlets: Sequence[bool] | NDArray[np.bool_] = (False, False, True),
     ) -> None:
         """Allocate all levels.
 
-        closed_regions   regions without anchor, or None
-        communicator     path to sums and extremes over all ranks
-        most_iterations  after so many the solution has failed
-        outlets          whether a side normal to x, y, z has a known pressure
+        closed_regions  regions without anchor, or None
+        communicator    path to sums and extremes over all ranks
+        outlets         whether a side normal to x, y, z has a known pressure
         """
         self._outlets = np.array(outlets, bool)
         self.communicator = communicator
@@ -160,7 +161,6 @@ class PressureEquation:
             level.relaxation = OVER_RELAXATION
         self.finest = self.levels[0]
         self.closed_regions = closed_regions
-        self.most_iterations = most_iterations
         self.residual, self.direction = np.zeros(self.finest.shape), np.zeros(self.finest.shape)
         planes = self.finest.shape[0]
         self._largest, self._parts = np.zeros(planes), np.zeros((planes, 3), np.int64)
@@ -195,7 +195,7 @@ class PressureEquation:
         left = self.communicator.largest(np.abs(self.residual))
         product, iterations = 1.0, 0
         while left > limit:
-            if iterations == self.most_iterations or not np.isfinite(left):
+            if iterations == MOST_ITERATIONS or not np.isfinite(left):
                 raise RunFailed(
                     f"pressure: residual {left:.3g} m3/s after {iterations} iterations, must be below {limit:.3g}; "
                     "take a smaller step if the flow diverges, or a looser tolerance if this is round-off"
