@@ -347,7 +347,7 @@ def places_of(i, edges):
 def edge_role(incident):
     """Row of an incident edge, and 1 where the particle is its first body, -1 where it is its second."""
     second = np.int64(incident) >> 63
-    return np.uint64(np.int64(incident) ^ second), 1.0 + 2.0 * second
+    return np.uint64(np.int64(incident) ^ second), -1.0 if incident < 0 else 1.0
 
 
 @inline

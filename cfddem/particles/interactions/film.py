@@ -112,6 +112,9 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     step        since the last positions; 0 if these are the same [s]
     """
     gap, before, minimum_gap = film.gap, memory.film_gap[k], film.minimum_gap
+    # read and written in any case: stores under conditions take longer where a loop works on several pairs at once
+    was_due, was_faster, owed = memory.film_due[k], memory.faster[k], memory.film_owed[k]
+    solved, fastest = memory.film_solved[k], memory.approach_speed[k]
     moved = step > 0.0 and before < np.inf
     # the film acts down to gap 0; below the minimum gap its resistance is linear in the gap
     begin, end = min(max(before, 0.0), film.cutoff_gap), min(max(gap, 0.0), film.cutoff_gap)
@@ -120,20 +123,19 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     middle = 0.5 * (max(begin, minimum_gap) + max(end, minimum_gap))
     above = film_resistance(at_gap(film, middle))
     taken = below * (high - low) + above * ((end - high) - (begin - low))
-    impulse = -share * taken if moved and weight > 0.0 and not memory.film_solved[k] else 0.0
+    impulse = -share * taken if moved and weight > 0.0 and not solved else 0.0
     # the lever is 0 for solids that overlap, and 1 above the minimum gap
     change = gap - before if moved else 0.0
     lever = min(max(gap, gap + change, 0.0) / minimum_gap, 1.0)
     leaps = gap > minimum_gap and abs(change) > LEAP * gap
     within = resistance > 0.0 and weight > 0.0
     rate = (np.inf if leaps else resistance * weight * lever) if within else 0.0
-    due = step * rate >= WEAK if moved else memory.film_due[k]
+    due = step * rate >= WEAK if moved else was_due
     owes = due and step * above * weight > STIFF
-    faster = within and gap > minimum_gap and begin - end > step * memory.approach_speed[k]
+    faster = within and gap > minimum_gap and begin - end > step * fastest
     memory.film_due[k], memory.film_unmoved[k] = due, not moved
-    memory.faster[k] = faster if moved else memory.faster[k]
-    if due and moved:
-        memory.film_owed[k] = impulse if owes else 0.0
+    memory.faster[k] = faster if moved else was_faster
+    memory.film_owed[k] = (impulse if owes else 0.0) if due and moved else owed
     put(memory.film_push, k, times(0.0 if owes else impulse, normal))
     if COUNT_FILM:
         memory.outside[k] += film_outside(at_least(film)) if within and moved else 0
@@ -157,8 +159,7 @@ def renew_film(k, between, viscosity, size, share, system, row, step):
     then = (memory.film_gap[k], memory.resistance[k], fastest, least)
     resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
     memory.resistance[k] = share * resistance
-    if minimum_gap != least or approach_speed != fastest:
-        memory.approach_speed[k], memory.minimum_gap[k] = approach_speed, minimum_gap
+    memory.approach_speed[k], memory.minimum_gap[k] = approach_speed, minimum_gap
     normal = times(1.0 / distance, separation)
     if DRIFTING:
         film = FilmState(gap, viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
