@@ -41,7 +41,7 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
     ):
         return []
     drop = measures["pressure_drop"].mean
-    if case.bed.fixed:
+    if case.stands_still:
         return list(_of_a_fixed_bed(case, measures, drop))
     weight = buoyant_weight(case) / case.floor_area
     rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
@@ -126,7 +126,7 @@ def _equipped(case: Case) -> bool:
 
 def weight_over_floor(case: Case) -> float | None:
     """Buoyant weight per floor area [Pa]; None if the flow does not have to carry it."""
-    if not case.has_fluid or case.bed.fixed or abs(case.laws.gravity[2]) == 0.0 or _equipped(case):
+    if not case.has_fluid or case.stands_still or abs(case.laws.gravity[2]) == 0.0 or _equipped(case):
         return None
     return buoyant_weight(case) / case.floor_area
 
@@ -158,7 +158,7 @@ def compared_with_drag_law(run: RunData, case: Case) -> Iterator[tuple[str, floa
     deviation from the equation of motion. Speeds are relative to the mean of the fluid, up to the first contact.
     """
     drag, fluid, law = case.laws.drag_function(), case.around, case.laws.drag_law
-    if not case.is_one_sphere or case.bed.fixed or law is None or drag is None:
+    if not case.is_one_sphere or case.stands_still or law is None or drag is None:
         return
     density, gravity = case.solid_density, np.array(case.laws.gravity)
     strength = math.hypot(*gravity)

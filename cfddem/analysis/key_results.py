@@ -193,7 +193,7 @@ def _shallow(case: Case, measures: Mapping[str, Measure]) -> str:
     bed, count = _bed_at_end(case, measures["bed_height"]), cell_counts(case.column.size, case.column.cell)[2]
     cells = measures["bed_height"].mean / case.column.height * count
     packed = 0.0 < bed.inlet <= bed.onset and FROM_HEIGHT in measures and measures[FROM_HEIGHT].mean < LOOSE
-    if cells >= SHALLOW or not (case.bed.fixed or packed):
+    if cells >= SHALLOW or not (case.stands_still or packed):
         return ""
     return (
         f"too low, as the bed is only {cells:.2g} cells high and the kernel blurs its ends: packed beds of 2, 4 and 8 "
@@ -237,7 +237,7 @@ def _classified(run: RunData, case: Case, measures: Mapping[str, Measure]) -> tu
     moving = f"the fastest particle moves at {fastest:.2g} m/s"
     fall = math.sqrt(math.hypot(*case.laws.gravity) * case.bed.largest_diameter)
     at_rest = bool(fastest <= STILL * fall)
-    if case.bed.fixed:
+    if case.stands_still:
         return "fixed bed", "the particles do not move", None
     weight = weight_over_floor(case)
     flows = case.has_fluid and case.column.ends == "flow" and case.fastest_inflow > 0.0

@@ -205,6 +205,9 @@ class Bed(Species):
                 raise InputError(name, None, "left out where start_corner and start_size are given", "give a count")
         if self.positions and self.start == "poured":
             object.__setattr__(self, "start", "placed")
+        if bool(self.positions) != (self.start == "placed"):
+            limit = f'{"left out" if self.positions else "given"} with start = "{self.start}"'
+            raise InputError("positions", None, limit, "one centre [x, y, z] for each particle, or another start")
         check_times("inlet_velocity", self.inlet_velocity)
         if self.lowest_inlet_velocity < 0.0:
             raise InputError(

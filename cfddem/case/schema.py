@@ -259,6 +259,11 @@ class Case(CaseTables):
         return self.particle_count == 1 and not self.feed
 
     @property
+    def stands_still(self) -> bool:
+        """Whether no particle moves in the whole run: a fixed bed, or particles that a table holds."""
+        return self.bed.fixed or any(table.holds_particles for table in self.feature_tables)
+
+    @property
     def reference_speed(self) -> float:
         """Highest collision speed to expect [m/s].
 
@@ -270,7 +275,7 @@ class Case(CaseTables):
         fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest_diameter)
         speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*feed.velocity) for feed in self.feed)]
         speeds += [wall.fastest for wall in self.wall if math.isfinite(wall.fastest)]
-        speeds += [abs(self.vessel.spin) * max(radius for _, radius in self.line)] if self.vessel else []
+        speeds += [abs(self.vessel.spin) * max((radius for _, radius in self.line), default=0.0)] if self.vessel else []
         return max(2.0 * self.fastest_inflow, self.fastest_by_pressure, fall, *speeds)
 
     @classmethod

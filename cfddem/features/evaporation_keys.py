@@ -137,10 +137,12 @@ class Evaporation(FeatureTable):
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         self._refuse_humidity(case)
-        gases = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
-        gases["outlet_temperature"] = given_or(heat.outlet_temperature, heat.gas_temperature)
-        gases |= {f"patch_temperature.{name}": value for name, value in heat.patch_temperature.items()}
-        for where, temperature in gases.items():
+        of_water = {"fluid_temperature": heat.fluid_temperature, "inlet_temperature": heat.gas_temperature}
+        of_water["outlet_temperature"] = given_or(heat.outlet_temperature, heat.gas_temperature)
+        of_water |= {f"patch_temperature.{name}": value for name, value in heat.patch_temperature.items()}
+        of_water["particle_temperature"] = heat.particle_temperature
+        of_water["spray_temperature"] = given_or(heat.spray_temperature, heat.particle_temperature)
+        for where, temperature in of_water.items():
             if not COLDEST <= temperature <= HOTTEST:
                 limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
                 raise InputError(f"heat.{where}", temperature, limit, "the laws are those of water")

@@ -98,7 +98,7 @@ def accuracy(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[tupl
     yield "filter width / kernel", widening(cell / width, case.surface), "", "of what drag sees; cells widen it"
     if math.isnan(bed.archimedes) or _is_no_plain_bed(case):
         return
-    if case.bed.fixed or 0.0 < bed.inlet <= bed.onset:
+    if case.stands_still or 0.0 < bed.inlet <= bed.onset:
         high = bed.height / case.column.height * steps.cells[2]
         table, at = (PACKED_SHARP, cell / case.bed.diameter) if sharp else (PACKED_SMEARED, high)
         measured = "a lattice of six layers" if sharp else f"fixed beds, here {high:.2g} cells"

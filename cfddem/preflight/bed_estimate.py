@@ -91,10 +91,10 @@ def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
     onset = balance.reynolds_in_balance(number, packed, drag) * scale
     reynolds = (inlet or terminal) / scale
     voidage = packed
-    if case.bed.start != "poured" and (case.bed.fixed or inlet == 0.0):
+    if case.bed.start != "poured" and (case.stands_still or inlet == 0.0):
         space = floor * case.column.height if vessel is None else float(vessel.volumes[-1])
         voidage = 1.0 - solids / space
-    elif case.bed.fixed:
+    elif case.stands_still:
         voidage = packed
     elif inlet > 0.0 and number > 0.0 and fluid.is_liquid:
         voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
@@ -128,9 +128,9 @@ def _pressure_drop(
         return balance.pressure_gradient(velocity, *flow, drag) if velocity > 0.0 else 0.0
 
     if vessel is None:
-        return gradient(inlet) * height if case.bed.fixed or inlet < onset else weight
-    most = math.inf if case.bed.fixed else weight / height
-    if not case.bed.fixed and fluid.is_liquid and inlet >= onset:
+        return gradient(inlet) * height if case.stands_still or inlet < onset else weight
+    most = math.inf if case.stands_still else weight / height
+    if not case.stands_still and fluid.is_liquid and inlet >= onset:
         return weight
     thickness, areas = vessel.layers(height)
     return float(sum(dz * min(gradient(inlet * floor / area), most) for dz, area in zip(thickness, areas)))
@@ -138,7 +138,7 @@ def _pressure_drop(
 
 def bubbles(case: Case, bed: BedEstimate) -> bool:
     """Whether the bed bubbles: a gas bed above minimum fluidisation. Correlations for homogeneous beds then fail."""
-    return not case.in_liquid and not case.bed.fixed and bed.inlet > bed.onset
+    return not case.in_liquid and not case.stands_still and bed.inlet > bed.onset
 
 
 def _terminal_by_law(case: Case, gravity: float) -> float:

@@ -152,7 +152,7 @@ def grid_damping(speed: float, wavelength: float, cell: float) -> float:
 
 def is_liquid_bed(case: Case) -> bool:
     """Whether a case is a bed of free particles in a liquid."""
-    return case.in_liquid and case.particle_count > 1 and not case.bed.fixed
+    return case.in_liquid and case.particle_count > 1 and not case.stands_still
 
 
 def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
@@ -161,7 +161,7 @@ def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
     In a periodic column the bed fills the column evenly.
     """
     column = case.column
-    if not case.in_liquid or not case.resists or case.bed.fixed:
+    if not case.in_liquid or not case.resists or case.stands_still:
         return None
     height, voidage = bed.height, bed.voidage
     if column.ends == "periodic":

@@ -143,7 +143,7 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
 def check_stiffness(case: Case, bed: BedEstimate, collision: CollisionEstimate, cost: CostEstimate) -> Iterator[Issue]:
     """Tell that a long run has contacts much stiffer than it needs."""
     species = case.species[collision.species]
-    if case.bed.fixed or case.is_one_sphere or case.run.particle_step is not None or cost.seconds < LONG_RUN:
+    if case.stands_still or case.is_one_sphere or case.run.particle_step is not None or cost.seconds < LONG_RUN:
         return
     solid, needed = case.material_of(species), needed_modulus(case, collision)
     if not 0.0 < needed < 0.1 * (solid.contact_modulus or solid.youngs_modulus):

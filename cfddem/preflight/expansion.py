@@ -65,7 +65,7 @@ def is_compared(case: Case) -> bool:
         and isinstance(inlet, float)
         and inlet > 0.0
         and not (
-            case.bed.jets or case.bed.fixed or case.bed.species or case.wall or case.feed or case.outlet or case.drains
+            case.bed.jets or case.stands_still or case.bed.species or case.wall or case.feed or case.outlet or case.drains
         )
         and abs(case.laws.gravity[2]) > 0.0
     )

@@ -148,7 +148,7 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )
     no_flow = ends == "flow" and case.fastest_inflow <= 0.0 and not any(e.pressure for e in case.patch.values())
     stirred = case.drains or case.feed or case.outlet or any(wall.moves for wall in case.wall)
-    if no_flow and not stirred and case.bed.start in ("poured", "expanded") and not case.bed.fixed:
+    if no_flow and not stirred and case.bed.start in ("poured", "expanded") and not case.stands_still:
         yield Issue(
             "warning", "bed.inlet_velocity", "0 m/s, and no patch is an inlet: no fluid enters",
             'give it, or a patch of kind = "inlet"; for a bed at rest set column.ends = "closed"',
@@ -158,7 +158,7 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             "warning", "column.ends", "periodic along gravity: particles and fluid accelerate without limit",
             "set laws.gravity = [0.0, 0.0, 0.0]",
         )  # fmt: skip
-    if not (case.bed.fixed or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
+    if not (case.stands_still or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
         yield from _check_inlet(case, bed)
     jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
     if jet and ends == "flow" and in_a_box:

@@ -117,7 +117,7 @@ def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
         if len(others) > 1
         else f"that of {others[0].name}, the one law"
     )
-    if case.bed.fixed:
+    if case.stands_still:
         return f"its drag and the pressure drop differ by {drag} from {count} fitted here"
     text = f"its drag differs by {drag} from {count} fitted here"
     if (ignores_voidage(law) and state["voidage"] < DILUTE) or (bed.inlet > 0.0 and state["voidage"] >= 1.0):
@@ -160,7 +160,7 @@ def _fitted_here(law: Law, state: Mapping[str, float]) -> list[Law]:
 
 def _result(case: Case, bed: BedEstimate, law: Law, state: Mapping[str, float]) -> tuple[str, float]:
     """The number of interest that follows from a law of drag: its name and value; NaN if there is none."""
-    if case.bed.fixed:
+    if case.stands_still:
         return "pressure drop", law.function(bed.reynolds, state["voidage"])
     if bed.inlet > bed.onset and case.required_fluid.is_liquid:
         packed = 1.0 - POURED_SOLID_FRACTION

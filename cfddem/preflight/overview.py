@@ -87,7 +87,7 @@ def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
     yield Row(group, "Ar", bed.archimedes, "", "Archimedes number")
     if surface := case.surface_in_words:
         yield Row(group, "surface of the bed", math.nan, "", surface)
-    if case.bed.fixed:
+    if case.stands_still:
         return
     law = bed_drag(case).__name__
     yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {law}")
@@ -218,7 +218,7 @@ def _surface(wall: CaseWall) -> tuple[float, str, str]:
 
 def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Row]:
     group, scales = "time scales", steps.time_scales
-    if not case.bed.fixed:
+    if not case.stands_still:
         chosen = "given" if case.run.particle_step else "2 % of the Hertz time, at most half the limit"
         yield Row(group, "particle step", steps.particle, "s", chosen)
         yield Row(group, "2 % of the Hertz time", scales.hertz, "s")
@@ -229,7 +229,7 @@ def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[
     yield Row(group, "fluid step", steps.fluid, "s", f"set by the {steps.limiting} criterion")
     for name, limit in sorted(steps.limits.items(), key=lambda name_and_limit: name_and_limit[1]):
         yield Row(group, f"{name} criterion", limit, "s", "limits the fluid step" * (name == steps.limiting))
-    if not case.bed.fixed:
+    if not case.stands_still:
         yield Row(group, "particle steps per fluid step", steps.substeps)
     if not math.isnan(bed.drag_factor) and 0.0 < bed.voidage < 1.0:
         fluid, density = case.required_fluid, case.solid_density
@@ -243,7 +243,7 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group = "expected result"
     if not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
         note = ""
-        if case.bed.fixed:
+        if case.stands_still:
             note = "fixed bed"
         elif bubbles(case, bed):
             note = "at least; the bed bubbles"
@@ -254,7 +254,7 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, "bed height", bed.height, "m", note)
         yield Row(group, "bed voidage", bed.voidage)
         if bed.inlet:
-            packed, law = case.bed.fixed or bed.inlet < bed.onset, bed_drag(case).__name__
+            packed, law = case.stands_still or bed.inlet < bed.onset, bed_drag(case).__name__
             area = "the floor area" if vessel_of(case) is None else "its mean cross-section"
             yield Row(group, "pressure drop", bed.pressure_drop, "Pa", law if packed else f"buoyant weight over {area}")
             if packed and vessel_of(case) is None and law != "ergun":

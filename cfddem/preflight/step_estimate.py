@@ -46,8 +46,7 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     run, speed = case.run, max(case.reference_speed, 1e-12)
     every = [_time_scales(case, species, speed) for species in case.species.values()]
     shortest = min(every, key=lambda scales: scales.recommended)
-    at_rest = case.bed.fixed or any(table.holds_particles for table in case.feature_tables)
-    particle = math.inf if at_rest else run.particle_step or shortest.recommended
+    particle = math.inf if case.stands_still else run.particle_step or shortest.recommended
     if not case.has_fluid:
         return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)
     cells = cell_counts(case.column.size, case.column.cell)
@@ -58,7 +57,7 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     rates = [width**-2 for width, count in zip(spacing, cells) if count > 1]
     if rates and case.around.viscosity > 0.0:
         flow["viscous"] = VISCOUS * case.around.density / (2.0 * case.around.viscosity * sum(rates))
-    if not case.bed.fixed:
+    if not case.stands_still:
         flow["particle Courant"] = courant_step(speed, spacing)
     return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, flow), cells)
 
