@@ -346,6 +346,13 @@ class Case(CaseTables):
         return Case(**values)
 
 
+def require_case(value: object) -> None:
+    """Refuse what is no case, such as the name of a file or a dict of tables."""
+    if not isinstance(value, Case):
+        remedy = "Case.from_toml(path) reads a file, Case(**tables) takes tables"
+        raise InputError("case", type(value).__name__, "a Case", remedy)
+
+
 def _given(value: float | None, default: float) -> float:
     return default if value is None else value
 

@@ -12,7 +12,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable, Findings
 from cfddem.case.materials import Checked
-from cfddem.features.heat_keys import Heat, Temperature
+from cfddem.features.heat_keys import Heat, Temperature, low_capacities
 from closures.contact_heat import jump_distance
 
 ROUGH = ("microhardness", "slope", "surface_roughness")
@@ -188,7 +188,8 @@ class ContactHeat(FeatureTable):
                 raise InputError(f"contact_heat.{key}", value, "at least 0 K, absolute zero", "temperatures are in K")
 
     def issues(self, case: Any) -> Findings:
-        """Tell what the exchange cannot see."""
+        """Warn of heat capacities in kJ, and tell what the exchange cannot see."""
+        yield from low_capacities("contact_heat.heat_capacity", self.heat_capacity)
         if self.radius == "overlap_circle" and any(material.contact_modulus for material in case.material.values()):
             reason = "contacts are softened by contact_modulus, and the circle of intersection grows with it"
             yield "warning", "contact_heat.radius", reason, 'take radius = "hertz", which uses youngs_modulus'

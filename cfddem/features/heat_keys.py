@@ -40,6 +40,9 @@ BOUSSINESQ = 0.1
 """Difference of density over the density up to which the approximation holds (Gray & Giorgini, Int. J. Heat Mass
 Transfer 19 (1976) 545-551) [-]."""
 
+LOWEST_CAPACITY = 20.0
+"""Specific heat capacity below which it may be in kJ/kg/K: of solids lead has 129, hydrogen 14.3e3 [J/kg/K]."""
+
 LARGEST_BIOT = 0.1
 """Biot number up to which a sphere has one temperature [-]."""
 
@@ -235,7 +238,10 @@ class Heat(FeatureTable):
         yield GROUP, "Pr", prandtl, "", "Prandtl number"
         yield GROUP, "Pe", reynolds * prandtl, "", "Peclet number of a particle, Re Pr"
         yield GROUP, "Nu", nusselt, "", f"Nusselt number at Re = {reynolds:.3g}"
-        biots = [nusselt * self.conductivity / (6.0 * solid) for solid in self.solid_conductivity.values()]
+        of_contacts = case.contact_heat.conductivity if case.contact_heat else {}
+        solids = {name: of_contacts[name] for name in self.heat_capacity.keys() & of_contacts.keys()}
+        solids |= self.solid_conductivity
+        biots = [nusselt * self.conductivity / (6.0 * solid) for solid in solids.values()]
         missing = "h d / (6 k); the limit is 0.1" if biots else "give heat.solid_conductivity"
         yield GROUP, "Bi", max(biots, default=math.nan), "", f"Biot number: {missing}"
         solid = case.material_of(largest).density * self.heat_capacity[case.material_name_of(largest)]
@@ -252,7 +258,9 @@ class Heat(FeatureTable):
             yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
 
     def issues(self, case: Any) -> Findings:
-        """Warn where the density differs too much for the approximation of Boussinesq."""
+        """Warn of heat capacities in kJ, and where the density differs too much for the approximation of Boussinesq."""
+        yield from low_capacities("heat.fluid_heat_capacity", {"": self.fluid_heat_capacity})
+        yield from low_capacities("heat.heat_capacity", self.heat_capacity)
         of_others = (*self.wall_temperature.values(), *self.patch_temperature.values())
         others = (self.gas_temperature, self.particle_temperature, *of_others)
         largest = max(abs(temperature - self.fluid_temperature) for temperature in others)
@@ -299,6 +307,15 @@ def transfer_number(case: Any, bed: Any, prandtl: float) -> float:
         return ranz_marshall(reynolds, prandtl, voidage)
     values = {"reynolds": reynolds, "prandtl": prandtl, "voidage": voidage}
     return float(law.function(**{name: values[name] for name in law.arguments}))
+
+
+def low_capacities(key: str, capacities: Mapping[str, float]) -> Findings:
+    """Warn of specific heat capacities that are too low for J/kg/K, by the names of their materials, or none."""
+    for name, value in capacities.items():
+        if value < LOWEST_CAPACITY:
+            reason = f"{value:.3g} J/kg/K is below that of any solid or fluid"
+            remedy = f"did you mean {1e3 * value:.4g} J/kg/K ({value:.3g} kJ/kg/K)?; water has 4180, glass 840, air 1007"
+            yield "warning", f"{key}.{name}".rstrip("."), reason, remedy
 
 
 def given_or(value: float | None, default: float) -> float:

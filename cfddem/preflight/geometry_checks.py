@@ -301,6 +301,15 @@ def check_vessel(case: Case) -> Iterator[Issue]:
             "warning", f"vessel.{key}", f"{narrow:.3g} m across, less than a particle, {largest:.3g} m",
             "use a larger radius; below about five diameters particles form arches",
         )  # fmt: skip
+    top = case.vessel.length or max((height for height, _ in case.vessel.line), default=0.0)
+    if top > case.column.height:
+        in_mm = f"; did you mean {1e-3 * top:.3g} m ({top:.3g} mm)?" * (top > LARGE_SURFACE * case.column.height)
+        yield Issue(
+            "warning", f"vessel.{'length' if case.vessel.length else 'line'}",
+            f"it reaches to {top:.3g} m, above the lid at {case.column.height:.3g} m, where its radius is "
+            f"{case.line[-1][1]:.3g} m",
+            f"end it at the lid, or raise column.height{in_mm}",
+        )  # fmt: skip
     if not case.fluid:
         return
     widest = max(case.column.cell_edges[:2])

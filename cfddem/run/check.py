@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from cfddem.backend.communicator import Shape
 from cfddem.backend.errors import InputError
-from cfddem.case.schema import Case
+from cfddem.case.schema import Case, require_case
 from cfddem.preflight.checks import check_quantities
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.summary import Preflight, preflight
@@ -28,6 +28,7 @@ def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> P
     >>> check(case).status, check(case.with_(**{"bed.inlet_velocity": 0.7})).status
     ('ok', 'error')
     """
+    require_case(case)
     result = preflight(case)
     if case.compare:
         from cfddem.run.history import units_of  # loads the compiler, which checks of plain columns lack

@@ -99,7 +99,11 @@ def measure(
             value = function(simulation)
             if np.ndim(value):
                 raise InputError(f"measure {name}", np.shape(value), "one number", "take its mean, or one element")
-            return {name: float(value)}
+            try:
+                return {name: float(value)}
+            except (TypeError, ValueError):
+                remedy = "return a float; NaN where there is no value"
+                raise InputError(f"measure {name}", str(value), "one number", remedy) from None
 
         _declare(name, Measure(columns, values, shared))
         return function

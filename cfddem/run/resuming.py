@@ -20,6 +20,7 @@ from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import parse, read_text
 from cfddem.io import checkpoint
+from cfddem.io.folder import read_about
 from cfddem.io.writer import RunFolder
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
@@ -107,7 +108,8 @@ def require_measures(written: RunFolder, case: Case) -> None:
 
 CHANGEABLE = (
     "title", "compare.*", "bed.inlet_velocity", "bed.seed", "fluid.viscosity", "fluid.viscosity_profile",
-    "heat.inlet_temperature", "heat.wall_temperature.*", "run.until", "run.every", "run.history_every",
+    "heat.inlet_temperature", "heat.wall_temperature.*", "heat.patch_temperature.*", "patch.NAME.velocity",
+    "patch.NAME.mass_flow", "run.until", "run.every", "run.history_every",
     "run.average_from", "run.until_error.*", "run.particle_step", "run.fluid_step", "run.reference_speed",
     *(f"{table}.{key}" for table in ("material.NAME", "pair.NAME.NAME") for key in (
         "youngs_modulus", "contact_modulus", "poisson", "restitution", "friction", "rolling_friction",
@@ -131,6 +133,7 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
 
     errors  InputError for a run without a checkpoint, a key that cannot change within a run, or an end before the state
     """
+    read_about(origin)  # refuses what is no run
     state = checkpoint.newest(origin)
     before = case_to_continue(origin, None, None)
     for key in changed([before, case]):

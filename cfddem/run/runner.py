@@ -24,7 +24,7 @@ from cfddem.backend.portions import Portions
 from cfddem.backend.stopwatch import Stopwatch
 from cfddem.case.column_grid import grid_of
 from cfddem.case.compare import require_measured_units
-from cfddem.case.schema import Case
+from cfddem.case.schema import Case, require_case
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import FLUID_FIELDS
@@ -130,6 +130,7 @@ class Run:
         errors             InputError if the folder holds a run or cannot be written, or for a case that differs from
                            that of `origin` in more than a run can change
         """
+        require_case(case)
         folder, text = Path(folder), text_with_kept_files(case) if text is None else text
         history.require_shared(case, communicator.size)
         require_measures_of(case)

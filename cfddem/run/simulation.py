@@ -14,7 +14,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.launch import keep_freed_memory
 from cfddem.backend.portions import Portions, rows_by_id
-from cfddem.case.schema import Case
+from cfddem.case.schema import Case, require_case
 from cfddem.coupling.coupling import Coupling, Uncoupled
 from cfddem.coupling.terms import ForceTerms, require_features
 from cfddem.features.feature_list import FEATURES
@@ -63,6 +63,7 @@ class Simulation:
         state: dict[str, Any] | None = None,
         communicator: Communicator = SERIAL,
     ) -> None:
+        require_case(case)
         keep_freed_memory()
         particles = None if state is None else particles_in(_share(state["particles"]["particles"], communicator))
         parts = parts_of(case, progress, particles, communicator)

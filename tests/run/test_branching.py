@@ -63,6 +63,19 @@ def test_a_changed_value_acts_and_the_branch_can_be_resumed(bed: Path, tmp_path:
     assert open_run(folder).history["time"][-1] == pytest.approx(0.016)
 
 
+def test_the_flow_through_a_patch_can_change(tmp_path: Path) -> None:
+    """It is the inlet velocity of a vessel: what leaves through the lid is what then enters."""
+    inlet = ("patch.air.kind=inlet", "patch.air.shape=whole", "patch.air.velocity=0.045", "bed.inlet_velocity=0")
+    words = [word for each in (*TINY, *inlet) for word in ("--set", each)]
+    assert call("run", "liquid-bed", "-o", str(tmp_path / "bed"), *words).code == 0
+    words = [word for each in ("patch.air.velocity=0.06", "until=0.011") for word in ("--set", each)]
+    done = call("run", "--from", str(tmp_path / "bed"), "-o", str(tmp_path / "faster"), *words)
+    assert done.code == 0, done.err
+    run = open_run(tmp_path / "faster")
+    leaving = (run.fluid("voidage") * run.fluid("velocity")[..., 2])[-1].mean()
+    assert leaving == pytest.approx(0.06, rel=0.01)  # at the centres of cells
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
