@@ -73,7 +73,7 @@ def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarr
         return particles, particles[liquid] / (4.0 / 3.0 * np.pi * particles["radius"] ** 3)
     if name not in particles:
         remedy = "run.record_collisions = true records the collisions" if name == COLLISIONS else ""
-        raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]), remedy)
+        raise InputError("colour", colour, nearest(colour, choices(run)), remedy)
     field = particles[name]
     if name == AGGLOMERATE:
         return particles, scattered(field)

@@ -348,15 +348,21 @@ class Stage:
 
 
 def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str, whole: bool = False) -> None:
-    """Draw a colour bar; `whole` has ticks at whole numbers alone."""
+    """Draw a colour bar; `whole` has one colour and one tick for each whole number."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     figure: Any = axes.figure
-    bar = figure.colorbar(ScalarMappable(Normalize(*limits), shades), ax=axes, fraction=0.08, pad=0.03, aspect=30)
+    numbers = np.arange(limits[0], limits[1] + 0.5)
+    steps = {"values": numbers, "boundaries": np.arange(limits[0] - 0.5, limits[1] + 1.0), "ticks": numbers}
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(*limits), shades), ax=axes, fraction=0.08, pad=0.03, aspect=30,
+        **(steps if whole else {}),
+    )  # fmt: skip
     bar.set_label(label)
     bar.outline.set_visible(False)
-    bar.ax.locator_params(axis="y", nbins=6, integer=whole)
+    if not whole:
+        bar.ax.locator_params(axis="y", nbins=6)
 
 
 def _corners(run: RunData) -> tuple[np.ndarray, np.ndarray]:

@@ -64,9 +64,8 @@ def is_compared(case: Case) -> bool:
         and case.column.ends == "flow"
         and isinstance(inlet, float)
         and inlet > 0.0
-        and not (
-            case.bed.jets or case.stands_still or case.bed.species or case.wall or case.feed or case.outlet or case.drains
-        )
+        and not (case.stands_still or case.bed.jets or case.bed.species)
+        and not (case.wall or case.feed or case.outlet or case.drains)
         and abs(case.laws.gravity[2]) > 0.0
     )
 

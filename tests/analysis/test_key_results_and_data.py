@@ -64,6 +64,29 @@ def test_the_regime_follows_from_pressure_and_velocity(
     assert (found.value, found.holds) == (regime, holds)
 
 
+HELD = """[heat]
+particle_temperature = 293.0
+fluid_temperature = 293.0
+conductivity = 0.6
+fluid_heat_capacity = 4180.0
+heat_capacity = { glass = 840.0 }
+[contact_heat]
+held = true
+conductivity = { glass = 1.0 }
+[run]"""
+
+
+def test_a_bed_that_a_table_holds_is_judged_as_a_fixed_one(tmp_path: Path) -> None:
+    """No law of expansion, no onset of fluidisation, and no advice to fix it, which is refused with contacts."""
+    slow = BED.replace("inlet_velocity = 0.05", "inlet_velocity = 0.005").replace("[run]", HELD)
+    found = report(made_up(tmp_path / "run", slow))
+    assert next(each.value for each in found.key_results if each.name == "regime") == "fixed bed"
+    assert [law.law for law in found.laws] == ["pressure drop by di_felice", "pressure drop by Ergun"]
+    checked = preflight(Case.from_text(slow))
+    assert "u_mf" not in {row.name for row in checked.rows}
+    assert not [each for each in checked.issues if "fluidisation" in each.reason or "bed.fixed" in each.remedy]
+
+
 def test_a_mean_that_drifts_much_is_not_to_be_used(tmp_path: Path) -> None:
     little = answer(made_up(tmp_path / "little", trend=5e-4), "bed height")
     much = answer(made_up(tmp_path / "much", trend=2e-2), "bed height")

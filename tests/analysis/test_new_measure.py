@@ -106,6 +106,10 @@ def test_a_measure_is_one_number_and_has_a_unit(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"measure rising = \(\d+,\): must be one number"):
         Run.begin(Case.from_text(SHORT), tmp_path / "run").go()
     history.forget("rising")
+    measure("m")(lambda simulation: "high")
+    with pytest.raises(InputError, match="measure <lambda> = 'high': must be one number; return a float"):
+        history.MEASURES["<lambda>"].values(None)
+    history.forget("<lambda>")
     with pytest.raises(InputError, match="measure = 'unitless': must be declared with its unit"):
 
         @measure

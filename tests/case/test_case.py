@@ -250,6 +250,15 @@ def test_the_advised_contact_modulus_is_the_least_that_the_limit_needs() -> None
     assert not remedies(advice) and remedies(advice / 1.12)
 
 
+def test_places_go_with_a_placed_start_and_with_no_other() -> None:
+    with pytest.raises(InputError, match=r'bed.positions: must be given with start = "placed"; one centre'):
+        Case.from_text(TEXT, "bed.toml", {"bed.start": "placed"})
+    places = {"bed.count": None, "bed.positions": [[0.02, 0.02, 0.02]]}
+    assert Case.from_text(TEXT, "bed.toml", places).bed.start == "placed"
+    with pytest.raises(InputError, match=r'bed.positions: must be left out with start = "suspended"'):
+        Case.from_text(TEXT, "bed.toml", {**places, "bed.start": "suspended"})
+
+
 def test_the_json_schema_holds_every_key() -> None:
     schema = Case.model_json_schema()
     for name, section in (("Bed", "bed"), ("Column", "column"), ("CaseLaws", "laws"), ("CaseRun", "run")):

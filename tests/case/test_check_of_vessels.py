@@ -111,6 +111,14 @@ def test_the_numbers_of_a_conical_vessel_are_those_of_its_cross_section(tmp_path
     assert weight > 4.0 * box
 
 
+def test_a_cone_that_goes_on_above_the_lid_is_warned_of_and_asked_about_if_it_is_in_millimetres() -> None:
+    for length, asked in ((0.1733, None), (0.3, False), (173.3, True)):
+        changed = gallery()["conical-spout"].with_(**{"vessel.length": length})
+        found = [each for each in preflight(changed).issues if each.key == "vessel.length"]
+        assert [each.severity for each in found] == ["warning"] * (asked is not None)
+        assert [("did you mean 0.173 m" in each.remedy) for each in found] == [asked] * (asked is not None)
+
+
 def test_a_bed_of_given_height_fills_the_part_of_the_column_that_walls_leave() -> None:
     """A plane in the middle halves the column, and the number of particles that fill it to a height."""
     liquid = gallery()["liquid-bed"]

@@ -106,6 +106,13 @@ def test_a_cone_from_a_file_is_the_cone_of_a_line(tmp_path: Path) -> None:
     assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
 
 
+def test_vessels_without_a_line_have_the_reference_speed_of_a_box(tmp_path: Path) -> None:
+    """Where the case gives none; a turning round wall has that of its rim."""
+    for case in (made(tmp_path, run__reference_speed=None), box().with_(**{"run.reference_speed": None})):
+        assert case.reference_speed == pytest.approx(2.0 * 0.5)
+        assert not [each for each in preflight(case).issues if each.severity == "error"]
+
+
 def test_particles_and_fluid_are_as_far_from_the_surface(tmp_path: Path) -> None:
     """A sphere that just reaches the surface of the fluid touches the wall of the particles, and no smaller one."""
     case = made(tmp_path)

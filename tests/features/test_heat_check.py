@@ -108,9 +108,17 @@ def test_a_solid_that_conducts_badly_is_warned_of_and_one_of_unknown_conductivit
     assert "the limit is 0.1" in found.reason
     (row,) = (row for row in preflight(case_of()).rows if row.name == "Bi")
     assert math.isnan(row.value) and "heat.solid_conductivity" in row.note
-    contacts = {"conductivity": {"glass": 0.04}}
-    of_contacts = preflight(case_of(contact_heat=contacts)).to_act_on
-    assert [each for each in of_contacts if each.key == "contact_heat.conductivity.glass"]
+    contacts = case_of(contact_heat={"conductivity": {"glass": 0.04}})
+    assert [each for each in preflight(contacts).to_act_on if each.key == "contact_heat.conductivity.glass"]
+    assert numbers(contacts)["Bi"] == pytest.approx(numbers(contacts)["Nu"] * 0.028 / (6.0 * 0.04))
+
+
+def test_a_heat_capacity_in_kilojoules_is_asked_about() -> None:
+    case = case_of(heat__fluid_heat_capacity=1.01, heat__heat_capacity={"glass": 0.84})
+    found = {each.key: each.remedy for each in preflight(case).to_act_on}
+    assert "did you mean 1010 J/kg/K" in found["heat.fluid_heat_capacity"]
+    assert "did you mean 840 J/kg/K" in found["heat.heat_capacity.glass"]
+    assert not [each for each in preflight(case_of()).to_act_on if "heat_capacity" in each.key]
 
 
 PATCH = {"patch__jet": {"kind": "inlet", "shape": "disc", "diameter": 0.01, "velocity": 0.9}}
@@ -135,6 +143,8 @@ PATCH = {"patch__jet": {"kind": "inlet", "shape": "disc", "diameter": 0.01, "vel
             r"vapour.fluid_fraction.*at most saturated; .*at 350 K is 0.30",
         ),
         ({"heat__fluid_temperature": 60.0}, r"heat.fluid_temperature.*253 to 640 K"),
+        ({"heat__particle_temperature": 40.0}, r"heat.particle_temperature.*253 to 640 K"),
+        ({"heat__spray_temperature": 20.0}, r"heat.spray_temperature.*253 to 640 K"),
         ({"heat__inlet_temperature": 700.0}, r"heat.inlet_temperature.*253 to 640 K"),
         (
             PATCH | {"vapour__patch_fraction": {"jet": 0.4}},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -145,11 +146,20 @@ def test_particles_from_files(tmp_path: Path) -> None:
         assert made.radius == pytest.approx([0.5e-3, 1e-3])
         assert made.material.tolist() == [0, 1]
     with pytest.raises(InputError, match="density"):
-        read_particles(table)
+        read_particles(table, scale=1e-3)
     wrong = tmp_path / "wrong.csv"
     wrong.write_text("x,y,z,diametre\n1,2,3,4\n")
     with pytest.raises(InputError, match="did you mean 'diameter'"):
         read_particles(wrong, density=1.0)
+    for text, said in (
+        ("x [mm],y,z,diameter\n1,2,3,4\n", "scale = 1.0: must be 0.001, as x in wrong.csv is in mm"),
+        ("x,y,z,diameter [inch]\n1,2,3,4\n", "unit of diameter in wrong.csv = 'inch': must be one of m, cm"),
+        ("x,y,z,diameter,density [g/cm3]\n1,2,3,4,5\n", "unit of density in wrong.csv"),
+        ("x,y,z,diameter\n", "must be rows of numbers below a line of names"),
+    ):
+        wrong.write_text(text)
+        with pytest.raises(InputError, match=re.escape(said)):
+            read_particles(wrong, density=1.0)
     wrong.write_text("x,y,z,diameter\n1,2,3,4\n1,2,three,4\n")
     with pytest.raises(InputError, match="particle 1"):
         read_particles(wrong, density=1.0)

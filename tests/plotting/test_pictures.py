@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from test_case_walls import HOPPER, TETRAHEDRON, write_binary_stl
 
@@ -23,8 +24,12 @@ from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
+<<<<<<< HEAD
 from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
 from cfddem.plotting.rendering import _moved, _surface, walls_of
+=======
+from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, _colour_bar, movie, picture
+>>>>>>> 7fe5c01d (Units of a table of particles; species in steps of colour; kilojoules, cones above the lid and held beds in the checks; tests)
 from cfddem.plotting.scene import Look, Scene, scene, window
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
@@ -277,6 +282,10 @@ def test_species_of_a_mixture_colour_its_spheres_and_are_named(tmp_path: Path) -
     low, high = colours.limits(colours.values(mixed, 0, "species")[1], "species")
     first, last = (colours.colour_map("species")((each - low) / (high - low)) for each in (0.0, 1.0))
     assert first[2] > first[0] and last[0] > last[2], "blue and orange"
+    axes = Figure().add_subplot()
+    _colour_bar(axes, colours.colour_map("species"), (low, high), "species", whole=True)
+    bar = axes.figure.axes[1]
+    assert (bar.get_yticks().tolist(), bar.get_ylim()) == ([0.0, 1.0], (-0.5, 1.5)), "one step for each species"
 
 
 def test_wrong_options_give_one_line(renders, bed, tmp_path):

@@ -11,10 +11,13 @@ from command_line import call, parsed
 from made_up_run import BED, made_up
 
 from cfddem.analysis.report import report
+from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
+from cfddem.run.check import check
 from cfddem.run.resuming import branch_state
 from cfddem.run.runner import Run
+from cfddem.run.simulation import Simulation
 
 TINY = ("start=suspended", "bed.count=50", "run.until=0.01", "run.every=0.005", "run.average_from=0")
 
@@ -110,6 +113,15 @@ def test_a_refusal_names_no_law_that_cannot_change(bed: Path, tmp_path: Path) ->
 def test_a_case_beside_from_and_a_folder_without_a_run_are_refused(bed: Path, tmp_path: Path) -> None:
     assert "left out: the case is that of" in call("run", "liquid-bed", "--from", str(bed)).err
     assert call("run", "--from", str(tmp_path), "--set", "until=1").code == 2
+    with pytest.raises(InputError, match="must be a run folder; it does not exist"):
+        branch_state(Case.from_toml(bed / "case.toml"), tmp_path / "nowhere")
+
+
+def test_what_is_no_case_is_named() -> None:
+    for wrong in ("bed.toml", {"bed": {}}):
+        for use in (check, Simulation, lambda case: Run.begin(case, Path("unwritten"))):
+            with pytest.raises(InputError, match=r"must be a Case; Case.from_toml\(path\) reads a file"):
+                use(wrong)
 
 
 def test_the_state_is_that_of_the_checkpoint_but_for_the_step(bed: Path) -> None:

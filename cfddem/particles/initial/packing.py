@@ -242,18 +242,22 @@ def _positive(name: str, value: float) -> None:
 
 COLUMNS = ("x", "y", "z", "diameter", "density", "material")
 
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+"""Units of length of a header [m]."""
+
 
 def read_particles(path: str | Path, density: float | None = None, material: int = 0, scale: float = 1.0) -> Particles:
     """Particles at rest, read from a file.
 
-    A `.csv` file begins with a line of names: `x, y, z, diameter` and optionally `density, material`; units in
-    brackets after a name are ignored. A `.npz` file has the arrays `position` (N, 3) and `diameter` (N,), and
-    optionally the same.
+    A `.csv` file begins with a line of names: `x, y, z, diameter` and optionally `density, material`. Units in
+    brackets after a name must be those of `scale`. A `.npz` file has the arrays `position` (N, 3) and `diameter` (N,),
+    and optionally the same.
 
     path      of the file
     density   of all particles if the file has none [kg/m3]
     material  of all particles if the file has none
     scale     length of the file's unit [m]
+    errors    InputError, one line with file and column or particle, for anything else
     """
     path = Path(path)
     if not path.is_file():
@@ -261,7 +265,7 @@ def read_particles(path: str | Path, density: float | None = None, material: int
     read = {".csv": _columns, ".npz": _arrays}.get(path.suffix.lower())
     if read is None:
         raise InputError("particles", str(path), "a .csv or .npz file")
-    columns = read(path)
+    columns = read(path, scale)
     for name in ("position", "diameter", *(("density",) if density is None else ())):
         if name not in columns:
             raise InputError(f"particles in {path.name}", sorted(columns), f"a table with {name}")
@@ -277,13 +281,16 @@ def read_particles(path: str | Path, density: float | None = None, material: int
     )
 
 
-def _columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open(encoding="utf-8") as lines:
-        head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    names = [name.split("[")[0].strip() for name in head.split(",")]
-    for name in names:
+def _columns(path: Path, scale: float) -> dict[str, np.ndarray]:
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
+    if len(lines) < 2:
+        raise InputError(f"particles in {path.name}", None, "rows of numbers below a line of names", "it has none")
+    headings = [heading.partition("[") for heading in lines[0].split(",")]
+    names = [name.strip() for name, _, _ in headings]
+    for name, unit in zip(names, (unit.strip("] \t") for _, _, unit in headings)):
         if name not in COLUMNS:
             raise InputError(f"column in {path.name}", name, nearest(name, COLUMNS))
+        _require_unit(f"{name} in {path.name}", name, unit, scale)
     try:
         table = np.genfromtxt(path, delimiter=",", skip_header=_lines_before_numbers(path), ndmin=2)
     except ValueError as refusal:
@@ -296,6 +303,16 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
     return columns
 
 
+def _require_unit(column: str, name: str, unit: str, scale: float) -> None:
+    """Refuse a unit of a header that is not the one in which its column is read; none is any."""
+    is_length = name in ("x", "y", "z", "diameter")
+    units = [*LENGTHS] if is_length else {"density": ["kg/m3"]}.get(name, ["-"])
+    if unit and unit not in units:
+        raise InputError(f"unit of {column}", unit, f"one of {', '.join(units)}")
+    if unit and is_length and not math.isclose(LENGTHS[unit], scale):
+        raise InputError("scale", scale, f"{LENGTHS[unit]:g}, as {column} is in {unit}")
+
+
 def _lines_before_numbers(path: Path) -> int:
     with path.open(encoding="utf-8") as lines:
         for number, line in enumerate(lines):
@@ -304,7 +321,7 @@ def _lines_before_numbers(path: Path) -> int:
     return 0
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
+def _arrays(path: Path, scale: float) -> dict[str, np.ndarray]:
     names = ("position", "diameter", "density", "material")
     try:
         with np.load(path) as file:
