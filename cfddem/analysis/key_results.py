@@ -165,7 +165,8 @@ def _voidage(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComp
         scatter = spread_in_words(expansions(case))
         if scatter and not holds and off <= SCATTER[1]:
             holds, verdict = None, f"{verdict}; {scatter}"
-    if FROM_PRESSURE in measures and _usable(voidage):
+    has_surface = case.stands_still or weight_over_floor(case) is not None
+    if FROM_PRESSURE in measures and _usable(voidage) and has_surface:
         verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE].mean:.3f}"
     yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)
 

@@ -84,7 +84,9 @@ class Material(Checked):
     poisson: float = Field(gt=-1, le=0.5, description="Poisson's ratio nu [-]")
     restitution: float = Field(default=1.0, gt=0, le=1, description="dry normal restitution e [-]")
     friction: float = Field(default=0.0, ge=0, description="dry friction coefficient mu [-]")
-    rolling_friction: float = Field(default=0.0, ge=0, description="rolling friction mu_r: lever arm over R* [-]")
+    rolling_friction: float = Field(
+        default=0.0, ge=0, description="rolling friction mu_r, of laws.rolling_resistance: lever arm over R* [-]"
+    )
     friction_lubricated: float | None = Field(
         default=None, ge=0, description="friction coefficient while a film separates the solids; default: friction [-]"
     )

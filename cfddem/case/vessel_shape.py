@@ -130,7 +130,8 @@ class CaseVessel(Checked):
             return
         widest = max(radius for _, radius in self.line_in(column))
         if 2.0 * widest > min(width, depth) * (1.0 + ROUND_OFF):
-            key = {"cylinder": "radius", "cone": "top_radius", "chain": "line"}[self.shape]
+            of_cone = "radius" if self.radius == widest else "top_radius"
+            key = {"cylinder": "radius", "cone": of_cone, "chain": "line"}[self.shape]
             limit = f"within the column: at most {0.5 * min(width, depth):g} m"
             raise InputError(f"vessel.{key}", widest, limit, "widen column.width and column.depth")
 
