@@ -24,12 +24,8 @@ from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
-<<<<<<< HEAD
-from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
-from cfddem.plotting.rendering import _moved, _surface, walls_of
-=======
 from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, _colour_bar, movie, picture
->>>>>>> 7fe5c01d (Units of a table of particles; species in steps of colour; kilojoules, cones above the lid and held beds in the checks; tests)
+from cfddem.plotting.rendering import _moved, _surface, walls_of
 from cfddem.plotting.scene import Look, Scene, scene, window
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
