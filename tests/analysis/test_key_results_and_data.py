@@ -49,12 +49,12 @@ def test_the_answer_says_which_voidage_to_believe_and_what_carries_the_bed(tmp_p
 
 
 def test_the_voidage_from_a_height_is_no_answer_where_a_tube_in_the_fluid_lifts_particles(tmp_path: Path) -> None:
-    """The height is then that of a fountain; it is told, and not said to be the one to use."""
+    """The height is then that of a fountain, and its voidage is not the one to use."""
     tube = '[[wall]]\nshape = "cylinder"\npoint = [0.01, 0.01, 0.01]\nradius = 0.005\nlength = 0.02\nsolid = "thin"\n'
-    for equipment, told in ((tube, False), ("", True)):
+    for equipment, recommended in ((tube, False), ("", True)):
         case = BED.replace("[run]", f"{equipment}[run]")
-        folder = made_up(tmp_path / f"run{told}", case, bed_voidage_from_pressure=0.6)
-        assert ("use this value" in str(answer(folder, "bed voidage").verdict)) is told
+        folder = made_up(tmp_path / f"run{recommended}", case, bed_voidage_from_pressure=0.6)
+        assert ("use this value" in str(answer(folder, "bed voidage").verdict)) is recommended
 
 
 @pytest.mark.parametrize(
