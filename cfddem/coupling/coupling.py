@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ import numpy as np
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SharpFlowSampler
 from cfddem.coupling.terms import CouplingTerms, ForceList, ForceTerms, inertia, total
-from cfddem.coupling.transfer import Transfer
+from cfddem.coupling.transfer import Transfer, columns
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
@@ -43,6 +44,7 @@ MAPPED = Field(
 )  # fmt: skip
 
 RESPONSE = Field("response_rate", "1/s", role="memory", meaning="rate at which a particle took up the fluid's velocity")
+"""Along each axis where a force resists by direction."""
 
 CROWDING = Field("crowding", "1", role="memory", meaning="solids over fluid around a particle in the last fluid step")
 
@@ -83,7 +85,8 @@ class Coupling:
         )
         self._mean_step = 0.0
         self.exchanged_impulse = np.zeros((0, 3))
-        own = (MAPPED, RESPONSE, CROWDING, *self.flow.fields)
+        response = replace(RESPONSE, components=3 if any(force.by_direction for force in forces) else 0)
+        own = (MAPPED, response, CROWDING, *self.flow.fields)
         for field in own:
             particles.declare(field)
         declared = [*(field.name for field in own), *self.momentum.declare(particles)]
@@ -155,7 +158,7 @@ class Coupling:
         self.forces.finish(terms)
         self.flow.remember(particles, terms.flow)
         particles.mapped_position = terms.cell_map.position
-        particles.response_rate = terms.resistance / terms.inertia
+        particles.response_rate = terms.response_rate
         particles.crowding = (1.0 - terms.flow.voidage) / terms.flow.voidage
 
     def solid_fraction(self, particles: Particles) -> Array:
@@ -206,7 +209,7 @@ class Coupling:
         of a particle; a shorter one for a part of it, as its square, or this would be a shock of pressure.
         """
         mean, last = self._mean_step or step, self.momentum.last_step
-        light = (1.0 - self._foresight(particles, mean))[:, None]
+        light = 1.0 - self._foresight(particles, mean)
         ahead = (step - light * mean) * particles.velocity
         if last > step * (1.0 + SAME_STEP):
             missed = self.kernel.nearest(particles.mapped_position - particles.position)
@@ -215,7 +218,7 @@ class Coupling:
         return self.kernel.wrapped(particles.position + ahead)
 
     def _foresight(self, particles: Particles, step: float) -> Array:
-        r"""Part w of their motion over the coming step by which particles are mapped ahead (N,) [-].
+        r"""Part w of their motion over the coming step by which particles are mapped ahead (N, 1) [-].
 
         .. math:: w = \min\left(\frac{1}{1+\lambda^2},\;
                   s\,\frac{2-\Lambda}{k\,(2\Lambda + 4 r)}\right),\qquad
@@ -224,11 +227,12 @@ class Coupling:
         with :math:`\lambda` the step over the time in which the fluid takes a particle along, and r the mass of the
         displaced fluid over that of the particle. The second part is s times the largest w at which particles that
         move to and fro from step to step do so less and less: the fluid between them moves by the opposite of their
-        volume flux, which is mapped ahead, and drag and pressure act back on them.
+        volume flux, which is mapped ahead, and drag and pressure act back on them. Where resistance depends on
+        direction, each axis has its own (N, 3): a bead that slides along a wall is not light because the wall holds it.
         """
-        response, crowding = step * particles.response_rate, particles.crowding
+        response, crowding = step * columns(particles.response_rate), columns(particles.crowding)
         drag = np.minimum(response * (1.0 + crowding) / (1.0 + response), 2.0)
-        displaced = self.fluid.density * particles.volume * particles.inverse_mass
+        displaced = columns(self.fluid.density * particles.volume * particles.inverse_mass)
         largest = STABLE * (2.0 - drag) / np.maximum(crowding * (2.0 * drag + 4.0 * displaced), 1e-12)
         return np.asarray(np.minimum(1.0 / (1.0 + response**2), largest))
 

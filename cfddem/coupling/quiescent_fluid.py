@@ -138,7 +138,7 @@ class QuiescentFluid:
         implicit, target, _ = implicit_coefficients(
             terms.resistance, terms.inertia, particles.velocity, terms.unseen, last_step, span, terms.directions
         )
-        terms.receive(-implicit[:, None] * target)
+        terms.receive(-implicit * target)
         self.forces.finish(terms)
         self.force = terms.forces
         particles[DURATION.name][:] = span

@@ -93,7 +93,7 @@ class SelfDisturbance(FluidForce):
     def end(self, terms: CouplingTerms) -> None:
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
         if self.fluid.viscous:
-            on_slip = total({line: terms.force(line) for line in terms.conductances}, terms.force("drag"))
+            on_slip = total({line: terms.force(line) for line in terms.implicit_force}, terms.force("drag"))
             screening = terms.conductance("drag") * terms.flow.others / (self.fluid.density * terms.flow.voidage)
             self.advance(
                 terms.particles, terms.cell_map, terms.flow.slip, on_slip, screening, self.fluid.density, terms.step

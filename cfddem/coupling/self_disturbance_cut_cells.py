@@ -29,13 +29,7 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.kernel_loops import weight
 from cfddem.coupling.self_disturbance_tables import lattice_of, tables_of
-from cfddem.coupling.self_disturbance_walls import (
-    at_shares,
-    cell_of,
-    flow_beside,
-    normal_first,
-    shares_in_cell,
-)
+from cfddem.coupling.self_disturbance_walls import at_shares, cell_of, flow_beside, normal_first, shares_in_cell
 from cfddem.fluid.cut_cells import contents
 from cfddem.fluid.grid import Array
 from cfddem.fluid.surfaces import Surface
@@ -94,15 +88,18 @@ class WallsOfCells:
         self._kernel, self._fields = kernel, ConstantFields(kernel, np.concatenate([number, fields]))
         self._cell, self._periods = cell_of(kernel), periods_of(kernel)
         self._axes = np.array(whole.cells) > 1
-        self._alone = tables_of(*lattice).flow
-        alone = [np.moveaxis(normal_first(self._alone, axis), 2, 0).swapaxes(1, 2) for axis in range(3)]
+        flow = tables_of(*lattice).flow
+        self._free = np.ascontiguousarray(np.moveaxis(flow, (0, 1), (3, 4)))
+        alone = [np.moveaxis(normal_first(flow, axis), 2, 0).swapaxes(1, 2) for axis in range(3)]
         lost = []
         for axis, far in enumerate(alone):
             half, full, more = (flow_beside(axis, "smooth", *lattice, share) for share in (0.5, 1.0, 1.5))
             in_layer = [half[0, 0], full[0, 0], more[0, 0], half[0, 1], full[0, 1], more[0, 1], *full[0, 2:]]
             across = [half[1, 0], full[1, 0], more[1, 0], *full[1, 1:-1]]
-            lost.append([_lost(far[0], in_layer, AWAY[0]), _lost(far[1], across, AWAY[1])])
-        self._tables = np.stack(alone), np.array(lost)
+            lost.append(np.array([_lost(far[0], in_layer, AWAY[0]), _lost(far[1], across, AWAY[1])]))
+        self._tables = tuple(
+            np.stack([by_apart(table, axis) for axis, table in enumerate(tables)]) for tables in (alone, lost)
+        )
 
     def left(self, position: Array, flow: Array) -> Array:
         """The modes of flows (N, MODES, 3) that particles at these places (N, 3) [m] drive or gather, beside walls."""
@@ -111,7 +108,7 @@ class WallsOfCells:
         pairs, normal = np.empty((len(position), 2, 16)), np.empty((len(position), 3))
         at_wall = 0.5 * (AWAY[0, 2] + AWAY[0, 3]) * min(kernel.grid.spacing)
         _sort_pairs(stencil, kernel.corners, self._fields.layered, self._periods, at_wall, pairs, normal)
-        _leave(position, (pairs, normal), self._cell, self._axes, (self._alone, *self._tables), flow, left)
+        _leave(position, (pairs, normal), (self._cell, self._axes), (self._free, *self._tables), flow, left)
         return left
 
 
@@ -249,74 +246,97 @@ def _lost(far: Array, beside: Sequence[Array], away: Array) -> Array:
     return np.stack(taken + taken[-1:] * (len(away) - len(taken)))
 
 
-@inline
-def _beside(axis, k, d, apart, away, tables):
-    """Flow along d of a mode in cells apart, beside a wall across an axis.
-
-    apart  4 z + 2 y + x by how far the cells lie apart
-    away   their mean distance in cells
-    """
-    (alone, lost), x, y, z = tables, apart & 1, (apart >> 1) & 1, apart >> 2
-    across, first, second = x if axis == 0 else (y if axis == 1 else z), y if axis == 0 else x, y if axis == 2 else z
-    distances, taken, row = AWAY[across], lost[axis, across], 0
-    while row < len(distances) - 2 and away > distances[row + 1]:
-        row += 1
-    inside = min(max(away, distances[0]), distances[-1])
-    part = (inside - distances[row]) / (distances[row + 1] - distances[row])
-    low, high = taken[row, k, d, first, second], taken[row + 1, k, d, first, second]
-    left = alone[axis, across, k, d, first, second] - (low + part * (high - low)) / max(away, distances[0])
-    return left * min(away / distances[0], 1.0)
+PIECE = 64
+"""Particles that share an array for sums over pairs."""
 
 
 @threaded
-def _leave(position, around, cell, axes, tables, flow, left):
+def _leave(position, around, lattice, tables, flow, left):
     """Write what walls leave of the modes of every particle (N, MODES, 3).
 
-    around  pairs and normals, of `_sort_pairs`
-    axes    along which there are several cells
-    tables  flow far from walls, of `Tables`; the same and what walls take times the distance, of cells apart
+    around   pairs and normals, of `_sort_pairs`
+    lattice  of `cell_of`, and whether there are several cells along each axis
+    tables   flow far from walls by distance along z, y, x (2, 2, 2, 3, MODES); `by_apart` of the same, and of what
+             walls take times the distance
     """
-    for n in prange(len(position)):
-        _leave_one(n, position, around, cell, axes, tables, flow, left)
+    count = len(position)
+    for piece in prange((count + PIECE - 1) // PIECE):
+        room = np.empty((3, 3 * flow.shape[1])), np.empty(flow.shape[1])
+        for n in range(piece * PIECE, min((piece + 1) * PIECE, count)):
+            _leave_one(n, position, around, lattice, tables, flow, room, left)
 
 
 @inline
-def _leave_one(n, position, around, cell, axes, tables, flow, left):
-    """`_leave` of one particle."""
-    (origin, inverse, linear), (of_free, alone, lost), (pairs, normals) = cell, tables, around
-    normal, count, through = of_row(normals, n), 0.0 + axes[0] + axes[1] + axes[2], 0.0
+def _leave_one(n, position, around, lattice, tables, flow, room, left):
+    """`_leave` of one particle; room for flows beside walls across each axis, and through the wall."""
+    ((origin, inverse, linear), axes), (of_free, alone, lost), (pairs, normals) = lattice, tables, around
+    sums, through = room
+    normal, count, modes = of_row(normals, n), 0.0 + axes[0] + axes[1] + axes[2], flow.shape[1]
     on_axis = dot(normal, normal) < 0.5  # where the distance has no slope
     narrow = 1.0 if on_axis else max(abs(normal[0]), abs(normal[1]), abs(normal[2]))
+    for axis in range(3):
+        if on_axis or normal[axis] != 0.0:
+            _over_pairs(n, pairs, axis, inverse[axis], narrow, alone, lost, sums)
+        else:
+            sums[axis] = 0.0
     shares = shares_in_cell(n, position, origin, inverse, linear)
-    for k in range(flow.shape[1]):
-        through = 0.0
-        for d in range(3):
-            towards, along, squares = 0.0, 0.0, LEAST
-            for axis in range(3):
-                square = axes[axis] / count if on_axis else normal[axis] ** 2
-                if axis == d:
-                    towards = _over_pairs(n, pairs, axis, k, d, inverse[axis], 1.0, (alone, lost))
-                elif square > LEAST:
-                    along += square * _over_pairs(n, pairs, axis, k, d, inverse[axis], narrow, (alone, lost))
-                    squares += square
-            free = max(at_shares(of_free[d, k], shares), 1e-300)
+    through[:] = 0.0
+    for d in range(3):
+        first, second = (1 if d == 0 else 0), (1 if d == 2 else 2)
+        one, other = normal[first] ** 2, normal[second] ** 2
+        if on_axis:
+            one, other = axes[first] / count, axes[second] / count
+        one, other = one if one > LEAST else 0.0, other if other > LEAST else 0.0
+        squares, at, next_at = LEAST + one + other, _place(first, d, modes), _place(second, d, modes)
+        for k in range(modes):
+            along = one * sums[first, at + k] + other * sums[second, next_at + k]
+            free = max(at_shares(of_free[..., d, k], shares), 1e-300)
             lengthwise = math.sqrt(max(along / (squares * free), 0.0))
             left[n, k, d] = lengthwise * flow[n, k, d]
-            through += normal[d] * (math.sqrt(max(towards / free, 0.0)) - lengthwise) * flow[n, k, d]
+            through[k] += normal[d] * (math.sqrt(max(sums[d, k] / free, 0.0)) - lengthwise) * flow[n, k, d]
+    for k in range(modes):
         for d in range(3):
-            left[n, k, d] += through * normal[d]
+            left[n, k, d] += through[k] * normal[d]
 
 
 @inline
-def _over_pairs(n, pairs, axis, k, d, inverse, narrow, tables):
-    """Flow of a particle along d in a mode, beside a wall across an axis.
+def _place(axis, d, modes):
+    """Where the modes of flow along d begin beside a wall across an axis: those along the axis come first."""
+    return 0 if d == axis else modes * (1 + d - (1 if d > axis else 0))
+
+
+def by_apart(table: Array, axis: int) -> Array:
+    """A table (2, ..., MODES, 3, 2, 2) by distance along the normal of a wall, mode, direction and distance along it,
+    as (8, ..., 3 MODES): by 4 z + 2 y + x of distances along the axes, and in the order of `_place`."""
+    first, second = (d for d in range(3) if d != axis)
+    cells = []
+    for apart in range(8):
+        steps = apart & 1, apart >> 1 & 1, apart >> 2
+        part = table[steps[axis], ..., steps[first], steps[second]][..., [axis, first, second]]
+        cells.append(part.swapaxes(-1, -2).reshape(*part.shape[:-2], -1))
+    return np.stack(cells)
+
+
+@inline
+def _over_pairs(n, pairs, axis, inverse, narrow, alone, lost, sums):
+    """Write the modes of flow of a particle beside a wall across an axis, in the order of `_place`.
 
     narrow  part of the flow along the wall that its slant leaves in the cells at it
     """
-    total = 0.0
+    modes = sums.shape[1] // 3
+    sums[axis] = 0.0
     for apart in range(16):
-        if pairs[n, 0, apart] > 0.0:
-            away = pairs[n, 1, apart] * inverse
+        share = pairs[n, 0, apart]
+        if share > 0.0:
+            away, cells = pairs[n, 1, apart] * inverse, apart % 8
             slant = 1.0 - (1.0 - narrow) * min(max((AWAY[0, 3] - away) / (AWAY[0, 3] - AWAY[0, 2]), 0.0), 1.0)
-            total += pairs[n, 0, apart] * slant * _beside(axis, k, d, apart % 8, away, tables)
-    return total
+            distances, row = AWAY[(cells >> axis) & 1], 0
+            while row < len(distances) - 2 and away > distances[row + 1]:
+                row += 1
+            inside = min(max(away, distances[0]), distances[-1])
+            part = (inside - distances[row]) / (distances[row + 1] - distances[row])
+            length, near = max(away, distances[0]), min(away / distances[0], 1.0)
+            for i in range(3 * modes):
+                low, high = lost[axis, cells, row, i], lost[axis, cells, row + 1, i]
+                left = (alone[axis, cells, i] - (low + part * (high - low)) / length) * near
+                sums[axis, i] += (share if i < modes else share * slant) * left

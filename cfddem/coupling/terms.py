@@ -13,7 +13,7 @@ from cfddem.backend.errors import InputError
 from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.seen_solids import SeenSolids
-from cfddem.coupling.transfer import Directions, ImplicitCoefficients, implicit_force, slip_of
+from cfddem.coupling.transfer import Directions, ImplicitCoefficients, by_axis, implicit_force, slip_of
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
 from cfddem.model.fields import Field
@@ -42,9 +42,10 @@ class ForceTerms:
     A force adds its part of a line of `LINES`:
 
     resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid. It is stored as
-                that of the slip of the cells, b N. Where the resistance depends on direction, b is the largest one,
-                and a tensor (N, 3, 3) is what it lacks of b
-    fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the resistance of a line
+                that of the slip of the cells, b N. Or a symmetric tensor (N, 3, 3), which adds a resistance that
+                depends on direction
+    fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the conductance of a line; tensors, such as
+                the resistance beside a wall, do not see it
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
@@ -56,23 +57,23 @@ class ForceTerms:
         self.particles, self.step, self.last_step = particles, step, last_step
         self.conductances: dict[str, Array] = {}
         self.fluctuations: dict[str, Array] = {}
-        self.lacks: dict[str, Array] = {}  # what the resistance of a line lacks of its conductance, by direction
+        self.tensors: dict[str, Array] = {}  # resistance of each line that depends on direction, beside conductances
         self.foreseen: Array | float = 0.0  # change of the fluid in the step that resistance by direction expects [m/s]
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
-        self.lacked: Array = np.zeros((0, 3))  # what the first of them lacks of that by its conductance, if anything
         self.added: Array = np.zeros(particles.count)  # change of the added mass at the start of the step (N,) [kg]
         self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
 
-    def resist(self, line: str, conductance: Array, lacks: Array | None = None) -> None:
-        """Add a resistance to the slip of the particles."""
-        _add(self.conductances, line, conductance * self.flow.narrowing)
-        if lacks is not None:
-            _add(self.lacks, line, lacks * np.reshape(self.flow.narrowing, (-1, 1, 1)))
+    def resist(self, line: str, resistance: Array) -> None:
+        """Add a resistance to the slip of the particles, a conductance (N,) or a tensor (N, 3, 3)."""
+        if resistance.ndim == 1:
+            _add(self.conductances, line, resistance * self.flow.narrowing)
+        else:
+            _add(self.tensors, line, resistance * np.reshape(self.flow.narrowing, (-1, 1, 1)))
 
     def fluctuate(self, line: str, velocity: Array) -> None:
-        """Add a fluctuation of the fluid velocity that acts through the resistance of a line."""
+        """Add a fluctuation of the fluid velocity that acts through the conductance of a line."""
         _add(self.fluctuations, line, velocity)
 
     def push(self, line: str, force: Array) -> None:
@@ -109,18 +110,24 @@ class ForceTerms:
         It is what the sampled flow lacks, less what the resistance of a line adds for itself alone.
         """
         unseen = self.flow.unseen
-        for line, velocity in self.fluctuations.items():
-            share = self.conductance(line) / np.maximum(self.resistance, 1e-300)
-            unseen = unseen - share[:, None] * velocity
+        for line in self.fluctuations:
+            unseen = unseen - self.fluctuation_in_all(line)
         return unseen
+
+    def fluctuation_in_all(self, line: str) -> Array:
+        """Change of the velocity of the cells that has the force of a line's fluctuation, in all resistance (N, 3)."""
+        conductance, velocity = self.conductance(line), self.fluctuations[line]
+        if self.tensors:
+            return slip_of(conductance[:, None] * velocity, self.resistance, total(self.tensors, velocity))
+        return np.asarray((conductance / np.maximum(self.resistance, 1e-300))[:, None] * velocity)
 
     @property
     def directions(self) -> Directions | None:
         """How all resistance depends on direction; None if it does not."""
-        if not self.lacks:
+        if not self.tensors:
             return None
         slip = self.flow.slip / np.reshape(self.flow.narrowing, (-1, 1)) + self.flow.unseen - self.unseen
-        return Directions(total(self.lacks, slip), slip + self.foreseen)
+        return Directions(total(self.tensors, slip), slip + self.foreseen)
 
     def receive(self, force: Array) -> None:
         """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].
@@ -128,20 +135,30 @@ class ForceTerms:
         The first line gets what the others leave; resistance that depends on direction is in no other.
         """
         of_slip, resistance = force, np.maximum(self.resistance, 1e-300)
-        if self.lacks:
-            of_slip = resistance[:, None] * slip_of(force, resistance, total(self.lacks, force))
-            self.lacked = of_slip - force
         for line, velocity in self.fluctuations.items():
             of_slip = of_slip - self.conductance(line)[:, None] * velocity
-        first, *others = [line for line in LINES if line in self.conductances] or ["drag"]
+        first, *others = [line for line in LINES if line in self.conductances or line in self.tensors] or ["drag"]
+        if self.tensors and others:
+            of_slip = resistance[:, None] * slip_of(of_slip, resistance, total(self.tensors, force))
         self.implicit_force = {line: of_slip * (self.conductances[line] / resistance)[:, None] for line in others}
         for part in self.implicit_force.values():
             force = force - part
         self.implicit_force = {first: force} | self.implicit_force
 
-    def implicit_force_at(self, slip: Array) -> Array:
-        """Force of all resistance by a slip of the cells alone, over the step (N, 3) [N]."""
-        return implicit_force(slip, self.resistance, total(self.lacks, slip), self.inertia, self.step)
+    def mean_slip(self, line: str) -> Array:
+        """Slip of the cells at which the resistance of a line has acted, without its fluctuation (N, 3) [m/s]."""
+        force, conductance = self.implicit_force[line], self.conductance(line)
+        fluctuation = self.fluctuations.get(line, np.zeros(3))
+        if line in self.tensors:
+            return slip_of(force - conductance[:, None] * fluctuation, conductance, self.tensors[line])
+        return np.asarray(force / np.maximum(conductance, 1e-300)[:, None] - fluctuation)
+
+    @property
+    def response_rate(self) -> Array:
+        """Rate at which a particle takes up the velocity of the fluid (N,), or along each axis (N, 3) [1/s]."""
+        if self.tensors:
+            return np.asarray(by_axis(self.resistance, total(self.tensors, self.resistance)) / self.inertia[:, None])
+        return np.asarray(self.resistance / self.inertia)
 
     def force(self, line: str) -> Array:
         """Force of a line on every particle (N, 3) [N]; zero for a line that the run lacks."""
@@ -169,6 +186,12 @@ class CouplingTerms(ForceTerms):
     ) -> None:
         super().__init__(particles, step, last_step)
         self.cell_map, self.solid = cell_map, solid
+
+    def implicit_force_at(self, slip: Array) -> Array:
+        """Force of all resistance by a slip of the cells alone, over the step (N, 3) [N]."""
+        if self.tensors:
+            return implicit_force(slip, self.resistance, total(self.tensors, slip), self.inertia, self.step)
+        return self.implicit.implicit * slip
 
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:

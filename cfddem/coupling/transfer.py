@@ -20,15 +20,18 @@ the step before. The fluid takes b* and v* into its own implicit step. What it h
 the particles by the weights of the deposit. So the sum over particles is the opposite of the sum over cells to
 round-off, for any stiffness of either side.
 
-**Resistance that depends on direction.** A particle has a resistance B, a symmetric tensor, and the cells of a fluid
-know one conductance b for it: the largest resistance in any direction. Over a step the particle receives what is given
-above, in each principal direction with the resistance there. With :math:`\Lambda = hB/C`,
+**Resistance that depends on direction.** A particle has the resistance B = b + T: a conductance b, the same in every
+direction, and a symmetric tensor T. Over a step it receives what is given above, in each principal direction with the
+resistance there. With :math:`\Lambda = hB/C`,
 
 .. math:: J = h\,B\,D^{-1}\left[(2+\Lambda)(u-v) - (1+\Lambda)\frac{hf}{C}\right],\qquad D = 2 + 2\Lambda + \Lambda^2
 
-at the velocity u of the fluid that is foreseen: that before the step and half of the change du of the last one, since
-drag sees the mean of a heavy fluid over the step. What else it changes acts through b* on both sides, so that the fluid
-stays stable, and its equations keep one conductance for all directions. Its change in this step is du', with
+The cells know one conductance for each axis, the sum of the sizes along a row of B, which in no direction is below it.
+Where the principal directions are axes, as beside a floor, these are the resistances themselves, and fluid and
+particle are implicit in each axis on its own. Elsewhere the force is that at the velocity u of the fluid that is
+foreseen: that before the step and half of the change du of the last one, since drag sees the mean of a heavy fluid over
+the step. What else the fluid changes acts through the conductances b* of the axes, so that it stays stable. Its change
+in this step is du', with
 
 .. math:: m\,du' = F - \tfrac12 b^*\,du' + \tfrac12 (b^* - B^*)\,du
 
@@ -65,10 +68,9 @@ class ImplicitCoefficients(NamedTuple):
     """Implicit coefficients of one step, of the particles and summed over cells."""
 
     step: float  # [s]
-    conductance: Array  # b (N,)
-    implicit: Array  # b* (N,)
+    implicit: Array  # b* (N, 1), or along each axis (N, 3)
     target: Array  # v* (N, m)
-    cell_conductance: Array  # sum of b* per volume (nz, ny, nx)
+    cell_conductance: Array  # sum of b* per volume (nz, ny, nx), or along each axis (nz, ny, nx, 3)
     cell_product: Array  # sum of b* v* likewise (nz, ny, nx, m)
     cell_source: Array | None = None  # sum of what is given beside, likewise (nz, ny, nx, k)
 
@@ -123,7 +125,7 @@ class Transfer:
         source       what every particle gives to the fluid beside (N, k); nothing if None
         directions   how the resistance depends on direction; None if it does not
         """
-        kernel, value = self.kernel, _columns(particles[self.value])
+        kernel, value = self.kernel, columns(particles[self.value])
         disturbance = _or_zero(disturbance, value)
         implicit, target, carried = implicit_coefficients(
             conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step, directions
@@ -131,9 +133,11 @@ class Transfer:
         if source is not None:
             carried = np.concatenate([carried, source], axis=1)
         cells = kernel.spread(cell_map, carried) / kernel.grid.cell_volume
-        product, beside = (np.moveaxis(part, 0, -1) for part in np.split(cells[1:], [value.shape[1]]))
+        axes = implicit.shape[1]
+        parts = np.split(cells, [axes, axes + value.shape[1]])
+        sent, product, beside = (np.moveaxis(part, 0, -1) for part in parts)
         cell_source = None if source is None else np.ascontiguousarray(beside)
-        return ImplicitCoefficients(step, conductance, implicit, target, cells[0], product, cell_source)
+        return ImplicitCoefficients(step, implicit, target, sent if axes > 1 else cells[0], product, cell_source)
 
     def apply(
         self, particles: Particles, cell_map: ParticleCellMap, sent: ImplicitCoefficients, weight: Array, value: Array
@@ -149,9 +153,9 @@ class Transfer:
 
     def receive(self, particles: Particles, sent: ImplicitCoefficients, gathered: Array) -> Array:
         """As `apply`, from the means of W and W u around every particle (N, 2 m); further columns are not used."""
-        value = _columns(particles[self.value])
+        value = columns(particles[self.value])
         rate = np.empty(value.shape)
-        before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
+        before, received = (columns(particles[name]) for name in (self.before, self.received[0]))
         _receive(gathered, sent.implicit, sent.target, sent.step, value, rate, before, received)
         self.last_step = sent.step
         return rate
@@ -160,7 +164,7 @@ class Transfer:
         """Value before the last step (N, m), what it received (N, m) and the length of that step [s]."""
         if self.last_step == 0.0:
             return after_source(value, _or_zero(None if self.source is None else self.source(particles), value))
-        return _columns(particles[self.before]), _columns(particles[self.received[0]]), self.last_step
+        return columns(particles[self.before]), columns(particles[self.received[0]]), self.last_step
 
 
 def before(value: str) -> str:
@@ -192,7 +196,7 @@ def _present(name: str) -> Callable[[Table, np.ndarray], np.ndarray]:
     return lambda table, rows: table[name][rows]
 
 
-def _columns(values: Array) -> Array:
+def columns(values: Array) -> Array:
     """Values of the particles as (N, m), a view; a rank may hold no particle."""
     return values.reshape(len(values), math.prod(values.shape[1:]))
 
@@ -210,22 +214,24 @@ def implicit_coefficients(
     step: float,
     directions: Directions | None = None,
 ) -> tuple[Array, Array, Array]:
-    """b* (N,), v* (N, m), and what each particle deposits: b* and b* v* (N, 1 + m).
+    """b* (N, 1), v* (N, m), and what each particle deposits: b* and b* v* (N, 1 + m).
+
+    Where the resistance depends on direction, b* is one for each axis (N, 3).
 
     last        value before the last step (N, m), what the transfer gave in it (N, m), and its length [s]
     directions  how the resistance depends on direction; None if it does not
     """
-    implicit, target = np.empty(len(value)), np.empty(value.shape)
-    carried = np.empty((len(value), 1 + value.shape[1]))
-    _implicit_coefficients(conductance, capacity, value, disturbance, last, step, (implicit, target, carried))
+    axes = conductance[:, None] if directions is None else by_axis(conductance, directions.tensor)
+    coefficients = np.empty(axes.shape), np.empty(value.shape), np.empty((len(value), axes.shape[1] + value.shape[1]))
+    _implicit_coefficients(axes, capacity, value, disturbance, last, step, coefficients)
     if directions is not None:
-        direct(directions, conductance, capacity, step, (value, disturbance), (implicit, target, carried))
-    return implicit, target, carried
+        aim_by_direction(directions, conductance, axes, capacity, step, (value, disturbance), coefficients)
+    return coefficients
 
 
 @threaded
 def _implicit_coefficients(conductance, capacity, value, disturbance, last, step, coefficients):
-    """Write b*, v*, and what each particle deposits, as coefficients.
+    """Write b*, v*, and what each particle deposits, as coefficients; conductances are (N, 1), or one for each axis.
 
     f is the change of the quantity over the last step, less what the transfer gave, per time; held values change
     nothing.
@@ -238,16 +244,17 @@ def _implicit_coefficients(conductance, capacity, value, disturbance, last, step
 def _implicit_one(n, conductance, capacity, value, disturbance, last, step, coefficients):
     """`_implicit_coefficients` of one particle."""
     (before, received, last_step), (implicit, target, carried) = last, coefficients
-    inverse, is_fixed = 1.0 / capacity[n], not math.isfinite(capacity[n])
-    stiffness = step * conductance[n] * inverse
-    theta = implicitness(stiffness)
-    implicit[n] = conductance[n] / (1.0 + theta * stiffness)
-    carried[n, 0] = implicit[n]
+    inverse, is_fixed, axes = 1.0 / capacity[n], not math.isfinite(capacity[n]), conductance.shape[1]
     for d in range(value.shape[1]):
+        along = min(d, axes - 1)
+        stiffness = step * conductance[n, along] * inverse
+        theta = implicitness(stiffness)
+        implicit[n, along] = conductance[n, along] / (1.0 + theta * stiffness)
+        carried[n, along] = implicit[n, along]
         gained = 0.0 if is_fixed else capacity[n] * (value[n, d] - before[n, d])
         other = (gained - received[n, d]) / last_step
         target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other
-        carried[n, 1 + d] = implicit[n] * target[n, d]
+        carried[n, axes + d] = implicit[n, along] * target[n, d]
 
 
 @threaded
@@ -256,10 +263,10 @@ def _receive(gathered, implicit, target, step, value, rate, before, received):
 
     gathered  W and W u around each particle (N, 2 m)
     """
-    components = target.shape[1]
+    components, axes = target.shape[1], implicit.shape[1]
     for n in prange(len(target)):
         for d in range(components):
-            rate[n, d] = implicit[n] * (gathered[n, components + d] - gathered[n, d] * target[n, d])
+            rate[n, d] = implicit[n, min(d, axes - 1)] * (gathered[n, components + d] - gathered[n, d] * target[n, d])
             before[n, d] = value[n, d]
             received[n, d] = step * rate[n, d]
 
@@ -317,39 +324,47 @@ def _numbers(reynolds, prandtl, voidage, ranges, numbers):
 class Directions(NamedTuple):
     """How the resistance of every particle depends on direction."""
 
-    lacks: Array  # what it lacks of the conductance, a symmetric tensor (N, 3, 3) [kg/s]
+    tensor: Array  # resistance beside the conductance, symmetric (N, 3, 3) [kg/s]
     slip: Array  # foreseen u less v before the step, with all that acts through the resistance (N, 3) [m/s]
 
 
-def slip_of(force: Array, conductance: Array, lacks: Array) -> Array:
+def by_axis(conductance: Array, tensor: Array) -> Array:
+    """Conductance along each axis that in no direction is below the resistance (N, 3) [kg/s]."""
+    others = np.abs(tensor)
+    for axis in range(3):
+        others[:, axis, axis] = tensor[:, axis, axis]
+    return np.asarray(conductance[:, None] + (others[..., 0] + others[..., 1] + others[..., 2]))
+
+
+def slip_of(force: Array, conductance: Array, tensor: Array) -> Array:
     """Slip at which the resistance has these forces (N, 3) [m/s]."""
     slip = np.empty_like(force)
-    _slip_of(force, conductance, lacks, slip)
+    _slip_of(force, conductance, tensor, slip)
     return slip
 
 
-def implicit_force(slip: Array, conductance: Array, lacks: Array, capacity: Array, step: float) -> Array:
-    """Implicit force of the resistance at a slip alone (N, 3) [N]; b* times the slip where nothing lacks."""
+def implicit_force(slip: Array, conductance: Array, tensor: Array, capacity: Array, step: float) -> Array:
+    """Implicit force of the resistance at a slip alone (N, 3) [N]."""
     force = np.empty_like(slip)
-    _implicit_force(slip, conductance, lacks, capacity, step, force)
+    _implicit_force(slip, conductance, tensor, capacity, step, force)
     return force
 
 
 @inline
-def _resistance(conductance, lacks, n):
+def _resistance(conductance, tensor, n):
     """Rows of the resistance of a particle."""
-    b, lack = conductance[n], lacks[n]
+    b, more = conductance[n], tensor[n]
     return (
-        (b - lack[0, 0], -lack[0, 1], -lack[0, 2]),
-        (-lack[1, 0], b - lack[1, 1], -lack[1, 2]),
-        (-lack[2, 0], -lack[2, 1], b - lack[2, 2]),
+        (b + more[0, 0], more[0, 1], more[0, 2]),
+        (more[1, 0], b + more[1, 1], more[1, 2]),
+        (more[2, 0], more[2, 1], b + more[2, 2]),
     )
 
 
 @threaded
-def _slip_of(force, conductance, lacks, slip):
+def _slip_of(force, conductance, tensor, slip):
     for n in prange(len(force)):
-        slip[n, 0], slip[n, 1], slip[n, 2] = solved(_resistance(conductance, lacks, n), of_row(force, n))
+        slip[n, 0], slip[n, 1], slip[n, 2] = solved(_resistance(conductance, tensor, n), of_row(force, n))
 
 
 @inline
@@ -362,9 +377,9 @@ def _denominator(matrix):
 
 
 @inline
-def _force(n, slip, gain, conductance, lacks, share):
+def _force(n, slip, gain, conductance, tensor, share):
     """Mean force over the step; gain is h f/C, and share h/C."""
-    resistance = _resistance(conductance, lacks, n)
+    resistance = _resistance(conductance, tensor, n)
     stiffness = times(share, resistance[0]), times(share, resistance[1]), times(share, resistance[2])
     change = minus(slip, gain)
     wanted = plus(plus(slip, change), through(stiffness, change))
@@ -372,30 +387,36 @@ def _force(n, slip, gain, conductance, lacks, share):
 
 
 @threaded
-def _implicit_force(slip, conductance, lacks, capacity, step, force):
+def _implicit_force(slip, conductance, tensor, capacity, step, force):
     for n in prange(len(slip)):
-        mean = _force(n, of_row(slip, n), NOTHING, conductance, lacks, step / capacity[n])
+        mean = _force(n, of_row(slip, n), NOTHING, conductance, tensor, step / capacity[n])
         force[n, 0], force[n, 1], force[n, 2] = mean
 
 
 @threaded
-def direct(directions, conductance, capacity, step, begin, coefficients):
+def aim_by_direction(directions, conductance, axes, capacity, step, begin, coefficients):
     """Change v* so that the particle receives by direction what it does, see above.
 
+    axes          of `by_axis` (N, 3)
     begin         v and disturbance (N, 3)
-    coefficients  b*, v*, and b* and b* v* of `implicit_coefficients` for the conductance alone
+    coefficients  b*, v*, and b* and b* v* of `implicit_coefficients` for the conductances along the axes
     """
     for n in prange(len(conductance)):
-        _direct_one(n, directions, conductance, capacity, step, begin, coefficients)
+        _aim_one(n, directions, conductance, axes, capacity, step, begin, coefficients)
 
 
 @inline
-def _direct_one(n, directions, conductance, capacity, step, begin, coefficients):
+def _aim_one(n, directions, conductance, axes, capacity, step, begin, coefficients):
     (value, disturbance), (implicit, target, carried) = begin, coefficients
     share, slip = step / capacity[n], of_row(directions.slip, n)
     start = plus(of_row(value, n), of_row(disturbance, n))
-    gain = times(1.0 / implicitness(share * conductance[n]), minus(of_row(target, n), start))  # h f/C
-    force = _force(n, slip, gain, conductance, directions.lacks, share)
-    new = minus(plus(start, slip), times(1.0 / max(implicit[n], 1e-300), force))
-    target[n, 0], target[n, 1], target[n, 2] = new
-    carried[n, 1], carried[n, 2], carried[n, 3] = times(implicit[n], new)
+    ahead, along = minus(of_row(target, n), start), of_row(axes, n)
+    gain = (
+        ahead[0] / implicitness(share * along[0]),
+        ahead[1] / implicitness(share * along[1]),
+        ahead[2] / implicitness(share * along[2]),
+    )  # h f/C
+    force = _force(n, slip, gain, conductance, directions.tensor, share)
+    for d in range(3):
+        target[n, d] = start[d] + slip[d] - force[d] / max(implicit[n, d], 1e-300)
+        carried[n, 3 + d] = implicit[n, d] * target[n, d]

@@ -349,20 +349,15 @@ class CouplingWork:
         kernel, fluid, received = self.coupling.kernel, self.coupling.fluid, particles.drag_impulse / terms.step
         cell_map, weight = terms.cell_map, np.moveaxis(fluid.drag_response()[0], -1, 0)
         gathered = kernel.sample(cell_map.stencil, cell_map.radius, weight)
-        conductance = gathered * terms.implicit.implicit[:, None]
+        conductance = gathered * terms.implicit.implicit
         acting = terms.implicit.target + received / np.maximum(conductance, 1e-300)
 
         def work(force: Array) -> float:
             return terms.step * float(fluid.communicator.sum(force * acting))
 
-        fluctuating = np.zeros_like(received)
-        for line, velocity in terms.fluctuations.items():
-            share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
-            if terms.lacks:
-                fluctuating = gathered * terms.implicit_force_at(share[:, None] * velocity)
-            else:
-                fluctuating = share[:, None] * conductance * velocity
         none = np.zeros_like(received)
+        fluctuations = sum((terms.fluctuation_in_all(line) for line in terms.fluctuations), none)
+        fluctuating = gathered * terms.implicit_force_at(fluctuations)
         return ImplicitWork(
             work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),
             work(terms.implicit_force.get("history", none)), work(terms.explicit.get("history", none)),

@@ -244,7 +244,7 @@ class HeatExchange(CaseFeature):
         fields = np.stack([np.ones_like(temperatures), temperatures, *humid])
         gathered = kernel.sample(cell_map.stencil, cell_map.radius, fields)
         rate = self.transfer.receive(particles, sent, gathered)[:, 0]
-        self.around, self.humidity = particles.temperature + rate / sent.implicit, gathered[:, -1]
+        self.around, self.humidity = particles.temperature + rate / sent.implicit[:, 0], gathered[:, -1]
         return np.asarray(step * rate)
 
     def cells_for_snapshot(self) -> Mapping[str, np.ndarray | Portions]:

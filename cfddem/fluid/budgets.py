@@ -37,7 +37,7 @@ def drag_exchange(fluid: FluidSolver) -> Array:
     face is a wall or an inlet, that half is taken by what holds the face, and is counted here too.
     """
     fields, (weight, velocity) = fluid.fields, fluid.drag_response()
-    push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - fields.owned("drag")[..., None] * velocity
+    push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - np.moveaxis(fields.owned("drag"), 0, -1) * velocity
     moved: Array = fluid.last_step * fluid.grid.cell_volume * weight * push * _held(fluid)[..., None]
     return moved
 
@@ -212,7 +212,7 @@ def _drag(fluid: FluidSolver, d: int) -> tuple[Array, Array]:
     right = share * (share + model_b * (1.0 - share))
     share = face / np.roll(centred, 1, axis)
     left = share * (share + model_b * (1.0 - share))
-    beta = 0.5 * (right * fields.drag + left * np.roll(fields.drag, 1, axis))
+    beta = 0.5 * (right * fields.drag[d] + left * np.roll(fields.drag[d], 1, axis))
     pull = 0.5 * (right * fields.drag_momentum[d] + left * np.roll(fields.drag_momentum[d], 1, axis))
     theta = implicitness.py_func(beta * fluid.last_step / (fluid.density * face))
     acting = theta * fields.velocity[d] + (1.0 - theta) * fields.other_velocity[d]
@@ -242,7 +242,7 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     mean = 0.5 * (old + new)
     voidage = layer(on_faces(fields.centred_voidage, d), at_face)
     cut = fluid.boundaries.cut
-    apertures, volumes = (np.broadcast_to(share, fluid.fields.drag.shape) for share in (cut.of_faces(d), cut.volume))
+    apertures, volumes = (np.broadcast_to(share, fluid.grid.padded_shape) for share in (cut.of_faces(d), cut.volume))
     area = fluid.grid.face_area(d) * layer(apertures, at_face)
     flow = side.inward * voidage * mean * h * area  # volume that came in [m3]
     pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))
@@ -253,7 +253,7 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     energy = 0.5 * fluid.density * flow * (mean**2 + np.where(outlet, across, 0.0))
     brought = energy[carries]
 
-    drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
+    drag, momentum = layer(fields.drag[d], inside), layer(fields.drag_momentum[d], inside)
     theta = implicitness.py_func(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
     acting = theta * new + (1.0 - theta) * old
     work = 0.5 * h * fluid.grid.cell_volume * layer(volumes, inside) * (drag * acting - momentum) * acting

@@ -50,7 +50,7 @@ FLUID_FIELDS = (
     CellField("mean_voidage", "1", "voidage in the middle of the last step, that of `velocity`", "cells", "state", 1.0),
     CellField("voidage_rate", "1/s", "rate of change of the voidage in the last step", "cells", "state"),
     CellField("viscosity", "Pa s", "dynamic viscosity without the sub-grid viscosity", "cells", "state"),
-    CellField("drag", "kg/m3/s", "coefficient of the drag"),
+    CellField("drag", "kg/m3/s", "coefficient of the drag along each axis", "vectors"),
     CellField("drag_momentum", "N/m3", "coefficient of the drag times velocity of the particles", "vectors"),
     CellField("source", "N/m3", "other forces on the fluid", "vectors"),
     CellField("new_voidage_rate", "1/s", "rate of change of the voidage in the step being made"),

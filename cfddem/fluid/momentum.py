@@ -130,7 +130,7 @@ class Balance(NamedTuple):
     stored: Array  # voidage that is stored with the old velocity,
     centred: Array  # that of the middle of the step,
     voidage: Array  # and that stored with the new velocity
-    drag: Array  # beta [kg/m3/s]
+    drag: Array  # (3, ...) beta along each axis [kg/m3/s]
     drag_momentum: Array  # (3, ...) beta v [N/m3]
     source: Array  # (3, ...) [N/m3]
     driving: Array  # mean pressure fall (3,) [Pa/m]
@@ -239,11 +239,11 @@ def predict(stretches, balance, medium, step, weight_b, new, mobility):
     old, rate_a, rate_b, pressure, stored, centred, voidage, drag, drag_momentum, source, driving, solved = balance
     shape, steps = voidage.shape, strides(voidage.shape)
     voidage, centred, stored = voidage.reshape(-1), centred.reshape(-1), stored.reshape(-1)
-    pressure, drag = pressure.reshape(-1), drag.reshape(-1)
+    pressure, drag = pressure.reshape(-1), drag.reshape(3, -1)
     drag_momentum, source = drag_momentum.reshape(3, -1), source.reshape(3, -1)
     rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
     old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
-    times, cells = (step, weight_b), (voidage, centred, stored, drag, pressure)
+    times, cells = (step, weight_b), (voidage, centred, stored, pressure)
     first, begins, counts = stretches.solved
     for k in prange(shape[0]):
         for part in range(first[k], first[k + 1]):
@@ -251,7 +251,8 @@ def predict(stretches, balance, medium, step, weight_b, new, mobility):
             for d in range(3):
                 place = at, at - steps[d], d
                 out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
-                faces, forces = (old[d], rate_a[d], rate_b[d], solved[d]), (drag_momentum[d], source[d], driving[d])
+                faces, drags = (old[d], rate_a[d], rate_b[d], solved[d]), (drag[d], drag_momentum[d])
+                forces = *drags, source[d], driving[d]
                 _predict_line(out, mobility_here, cells, faces, forces, place, medium, times)
 
 
@@ -260,13 +261,13 @@ def _predict_line(out, mobility, cells, faces, forces, place, medium, times):
     """`predict` of a line of faces.
 
     out, mobility  of the line
-    cells          voidage, centred and stored voidage, drag, pressure
-    faces, forces  along the direction: old velocity, both rates, solved; drag momentum, source, driving
+    cells          voidage, centred and stored voidage, pressure
+    faces, forces  along the direction: old velocity, both rates, solved; drag, drag momentum, source, driving
     place          of the line in flat fields, that of the cells before it, and the direction
     times          the step, and the weight of the second rate
     """
-    (voidage, centred, stored, drag, pressure), (old, rate_a, rate_b, solved) = cells, faces
-    (drag_momentum, source, driving), (at, below, d), (step, weight_b) = forces, place, times
+    (voidage, centred, stored, pressure), (old, rate_a, rate_b, solved) = cells, faces
+    (drag, drag_momentum, source, driving), (at, below, d), (step, weight_b) = forces, place, times
     density, inverse, model_b, n = medium.density, medium.inverse[d], medium.model_b, out.size
     e_right, e_left = line(voidage, at, n), line(voidage, below, n)
     c_right, c_left = line(centred, at, n), line(centred, below, n)
@@ -321,15 +322,15 @@ def drag_seen(balance, new, medium, step, weight, mean):
     """
     old, voidage, drag, solved = balance.old, balance.centred, balance.drag, balance.solved
     shape, steps = voidage.shape, strides(voidage.shape)
-    voidage, drag, solved = voidage.reshape(-1), drag.reshape(-1), solved.reshape(3, -1)
+    voidage, drag, solved = voidage.reshape(-1), drag.reshape(3, -1), solved.reshape(3, -1)
     old, new, weight, mean = old.reshape(3, -1), new.reshape(3, -1), weight.reshape(3, -1), mean.reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
-        e_here, b_here = line(voidage, at, n), line(drag, at, n)
+        e_here = line(voidage, at, n)
         for d in range(3):
             below, above = at - steps[d], at + steps[d]
             e_below, e_above = line(voidage, below, n), line(voidage, above, n)
-            b_below, b_above = line(drag, below, n), line(drag, above, n)
+            b_here, b_below, b_above = line(drag[d], at, n), line(drag[d], below, n), line(drag[d], above, n)
             free_low, free_high = line(solved[d], at, n), line(solved[d], above, n)
             old_low, old_high = line(old[d], at, n), line(old[d], above, n)
             new_low, new_high = line(new[d], at, n), line(new[d], above, n)

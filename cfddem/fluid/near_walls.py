@@ -139,7 +139,7 @@ class NearWalls(NoWalls):
         """See `NoWalls.add_held`."""
         fields = self.fields
         for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
-            at = faces.stiff_at.astype(np.int64) + 2 * fields.drag.shape[1] * fields.drag.shape[2]
+            at = faces.stiff_at.astype(np.int64) + 2 * fields.source.shape[2] * fields.source.shape[3]
             old, stage, new = (
                 field[d].ravel()[at] for field in (fields.other_velocity, fields.stage_velocity, fields.velocity)
             )

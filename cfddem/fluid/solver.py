@@ -161,7 +161,7 @@ class FluidSolver:
         """Advance the fluid by `step` [s].
 
         voidage           (nz, ny, nx) at the end of the step; None leaves it as it is
-        drag_coefficient  beta (nz, ny, nx) of the model chosen [kg/m3/s]; None is zero
+        drag_coefficient  beta of the model chosen (nz, ny, nx), or by axis (nz, ny, nx, 3) [kg/m3/s]; None is zero
         drag_momentum     beta v (nz, ny, nx, 3), v the velocity of the particles [N/m3]; None is zero
         source            (nz, ny, nx, 3) force on the fluid per volume of the cell [N/m3]; None is zero
         returns           StepReport
@@ -214,18 +214,18 @@ class FluidSolver:
         if coefficient is None:
             fields.drag.fill(0.0)
         else:
-            values = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
+            wanted = (*shape, 3) if np.ndim(coefficient) == 4 else shape
+            values = checked_field("drag_coefficient", coefficient, wanted, self.communicator, negative=False)
             self._set_cells(fields.drag, values)
         for name, field in (("drag_momentum", momentum), ("source", source)):
             if field is None:
                 getattr(fields, name).fill(0.0)
             else:
-                values = checked_field(name, field, (*shape, 3), self.communicator)
-                self._set_cells(getattr(fields, name), np.moveaxis(values, -1, 0))
+                self._set_cells(getattr(fields, name), checked_field(name, field, (*shape, 3), self.communicator))
 
     def _set_cells(self, padded: Array, cells: Array) -> None:
-        """Write the cells of a padded field, and fill its ghosts."""
-        self.grid.inner(padded)[:] = cells
+        """Write the cells of a padded field, (nz, ny, nx) or vectors (nz, ny, nx, 3), and fill its ghosts."""
+        self.grid.inner(padded)[:] = np.moveaxis(cells, -1, 0) if np.ndim(cells) == 4 else cells
         self.boundaries.halo.fill(padded)
 
     def _find_explicit_force(self, velocity: Array, voidage: Array, force: Array, medium: Medium) -> None:

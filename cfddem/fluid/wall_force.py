@@ -88,7 +88,7 @@ def pressure_on_side(fluid: FluidSolver, side: Side, slope: Array) -> Array:
         return side.layer(values, at)[LOW:-HIGH, LOW:-HIGH]
 
     def drag(at: int, velocity: Array) -> Array:
-        return plane(fields.drag, at) * velocity - plane(fields.drag_momentum[d], at)
+        return plane(fields.drag[d], at) * velocity - plane(fields.drag_momentum[d], at)
 
     here, beyond = (plane(fields.mean_voidage, at) for at in (cell, cell + inward))
     between, normal = 0.5 * (here + beyond), fields.velocity[d]

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from cfddem import Case, Simulation
+from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.terms import ForceTerms
 from cfddem.features.energy import EnergyLedger
+from cfddem.particles.state import make_particles
 
 WIDTH, RADIUS = 0.032, 1e-3
 
@@ -48,7 +51,7 @@ def test_momentum_and_energy_are_kept_beside_a_wall(laws: dict[str, Any]) -> Non
         simulation.step()
         weight, seen = fluid.drag_response()
         sent = simulation.terms.implicit
-        received = (weight * (sent.cell_product - sent.cell_conductance[..., None] * seen)).sum(axis=(0, 1, 2))
+        received = (weight * (sent.cell_product - sent.cell_conductance * seen)).sum(axis=(0, 1, 2))
         forces = sum(simulation.terms.implicit_force.values())
         np.testing.assert_allclose(
             fluid.grid.cell_volume * received, -forces.sum(axis=0), rtol=0.0, atol=1e-12 * np.abs(forces).sum()
@@ -57,9 +60,10 @@ def test_momentum_and_energy_are_kept_beside_a_wall(laws: dict[str, Any]) -> Non
     assert abs(row["energy_remainder"]) < 1e-3 * row["energy_put_in"]
 
 
-@pytest.mark.parametrize(("density", "most"), [(2540.0, 0.15), (7800.0, 0.5)])
+@pytest.mark.parametrize(("density", "most"), [(2540.0, 1e-3), (7800.0, 0.012)])
 def test_a_stream_takes_a_bead_at_the_floor_along_as_in_fine_steps(density: float, most: float) -> None:
-    """Water that accelerates at 1 m/s2; the bead is held in one direction 1400 times as hard as in the others."""
+    """Water that accelerates at 1 m/s2; the bead is held in one direction 1400 times as hard as in the others, and with
+    one conductance for all directions the long steps would be wrong by 8 and 44 %."""
 
     def speed(step: float | None) -> float:
         simulation = beads_beside_floor([1e-5], {"material.glass.density": density, "run.fluid_step": step})
@@ -69,5 +73,58 @@ def test_a_stream_takes_a_bead_at_the_floor_along_as_in_fine_steps(density: floa
         return float(simulation.particles.velocity[0, 0])
 
     fine = speed(5e-5)
-    assert speed(2e-4) == pytest.approx(fine, rel=0.06)
+    assert speed(2e-4) == pytest.approx(fine, rel=5e-4)
     assert speed(None) == pytest.approx(fine, rel=most)
+
+
+def test_beads_that_slide_along_the_floor_are_mapped_to_where_they_go() -> None:
+    """Heavy along the floor, light towards it: the voidage at the end of a step is that of their places then."""
+    simulation = beads_beside_floor([1e-5], {"bed.initial_velocity": (0.05, 0.0, 0.0)})
+    for _ in range(12):
+        simulation.step()
+    beads, step = simulation.particles, simulation.last_step
+    beyond = beads.mapped_position[:, 0] - beads.position[:, 0]
+    assert np.abs(beyond).max() < 0.02 * step * beads.velocity[0, 0]
+    assert beads.response_rate[0, 2] > 100.0 * beads.response_rate[0, 0]
+
+
+def test_a_fluctuation_acts_through_the_drag_law_alone() -> None:
+    """Beside a wall and beside a history force: what all resistance receives, and each line of it."""
+    draw = np.random.default_rng(1)
+    half, slip, fluctuation = draw.normal(size=(4, 3, 3)), *draw.normal(size=(2, 4, 3))
+    beside, drag, history = half @ half.swapaxes(1, 2), *draw.uniform(1.0, 2.0, (2, 4))
+    terms = ForceTerms(make_particles(draw.normal(size=(4, 3)), RADIUS, 2540.0), 1e-3, 1e-3)
+    terms.flow = SampledFlow(slip, np.zeros((4, 3)), *np.ones((4, 4)))
+    for line, resistance in (("drag", drag), ("drag", beside), ("history", history)):
+        terms.resist(line, resistance)
+    terms.fluctuate("drag", fluctuation)
+    assert terms.directions is not None
+    whole = beside + np.multiply.outer(drag + history, np.eye(3))
+    force = np.einsum("nde,ne->nd", whole, terms.directions.slip)
+    of_drag = np.einsum("nde,ne->nd", beside, slip) + drag[:, None] * (slip + fluctuation)
+    np.testing.assert_allclose(force, of_drag + history[:, None] * slip, rtol=1e-10, atol=1e-10)
+    terms.receive(force)
+    np.testing.assert_allclose(terms.implicit_force["drag"], of_drag, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(terms.implicit_force["history"], history[:, None] * slip, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(terms.mean_slip("drag"), slip, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize(("film", "most"), [("none", 5e-4), ("nijssen", 1e-4)])
+def test_beside_walls_too_agitation_pushes_a_bed_as_a_whole_nowhere(film: str, most: float) -> None:
+    """The sum of what fluctuations do to all particles in a step, found by leaving them out, over that of its sizes.
+    Beads held by walls take up less of them within a step."""
+    places = (0.00105 + 0.00278 * np.indices((6, 6, 4)).reshape(3, -1).T).tolist()
+    bed = {"bed.positions": places, "bed.inlet_velocity": 0.06, "laws.agitation": "pseudo_turbulence"}
+    column = {"column.width": 0.016, "column.cell": 0.004, "column.sides": "no_slip", "column.ends": "flow"}
+    simulation = beads_beside_floor([1.0], bed | column | {"laws.lubrication": film})
+    for _ in range(5):
+        simulation.step()
+    coupling, beads = simulation.coupling, simulation.owned
+    terms = coupling.prepare(beads, simulation.last_step)
+    pushed = terms.implicit.target.copy()
+    terms.fluctuations.clear()
+    left = coupling.momentum.prepare(
+        beads, terms.cell_map, terms.resistance, terms.step, terms.unseen, None, terms.directions
+    )
+    force = left.implicit * (left.target - pushed)
+    assert 0.0 < np.abs(force.sum(axis=0)).sum() < most * np.abs(force).sum()

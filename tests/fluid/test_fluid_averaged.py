@@ -252,6 +252,23 @@ def test_stiff_drag_relaxes_the_fluid_to_the_particle_velocity(stiffness, model)
         assert fluid.velocity == pytest.approx(np.broadcast_to((1 - left) * target, (*grid.shape, 3)), rel=1e-9)
 
 
+def test_each_axis_has_its_own_drag():
+    """The velocity along an axis relaxes as if its drag were that of all axes, to the same bits."""
+
+    def relaxed(beta):
+        fluid = FluidSolver(Grid((4, 4, 4), (0.01,) * 3), ALL_PERIODIC, density=1.2, viscosity=1.8e-5, voidage=0.5)
+        coefficient = np.broadcast_to(beta, (4, 4, 4, 3))
+        for _ in range(3):
+            fluid.step(1e-3, None, coefficient, coefficient * [0.3, -0.2, 0.1])
+        ledger = budgets.momentum_ledger(fluid)
+        assert ledger["change"] == pytest.approx(ledger["drag"], rel=1e-9)
+        return fluid.velocity
+
+    by_axis = relaxed([10.0, 600.0, 1e5])
+    for axis, beta in enumerate((10.0, 600.0, 1e5)):
+        assert (by_axis[..., axis] == relaxed(beta)[..., axis]).all()
+
+
 def test_stiff_drag_in_a_packed_block_is_stable():
     """A block of voidage 0.5 at rest, sharp edges, z = 1e6, in a stream: the fluid in it stops."""
     grid = Grid((20, 20, 20), (0.01,) * 3)

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from inspect import signature
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -96,12 +96,9 @@ class Drag(FluidForce):
         if self._kernel is None:
             return
         kernel, flow, volume = self._kernel, terms.flow, terms.cell_map.volume
-        force = terms.implicit_force["drag"]
-        if terms.lacks:
-            force = force + terms.lacked
-        fluctuation = terms.fluctuations.get("drag", np.empty((0, 3)))
-        drag, over_volume, rest = np.empty((3, *force.shape))
-        _drag_alone(force, terms.conductance("drag"), fluctuation, self._alone, volume, drag, over_volume)
+        slip = terms.mean_slip("drag")
+        drag, over_volume, rest = np.empty((3, *slip.shape))
+        _drag_alone(slip, self._alone, volume, drag, over_volume)
         density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
         in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
         in_solids = terms.seen_solids.averaged(over_volume)
@@ -133,21 +130,15 @@ class Drag(FluidForce):
 
 
 @threaded
-def _drag_alone(force, conductance, fluctuation, alone, volume, drag, over_volume):
+def _drag_alone(slip, alone, volume, drag, over_volume):
     """Force of the drag law alone on every particle, and the same over its volume (N, 3) [N], [N/m3].
 
-    force        of the conductance on the slip of the cells and the fluctuation (N, 3) [N]
-    conductance  of the line of drag (N,) [kg/s]
-    fluctuation  of the velocity of the cells in this line (N, 3), or (0, 3) without any [m/s]
-    alone        conductance of the drag law alone (N,) [kg/s]
+    slip   of the cells (N, 3) [m/s]
+    alone  conductance of the drag law alone (N,) [kg/s]
     """
-    fluctuates = len(fluctuation) > 0
     for n in prange(len(drag)):
         for d in range(3):
-            slip = force[n, d] / max(conductance[n], 1e-300)
-            if fluctuates:
-                slip -= fluctuation[n, d]
-            drag[n, d] = alone[n] * slip
+            drag[n, d] = alone[n] * slip[n, d]
             over_volume[n, d] = drag[n, d] / volume[n]
 
 
@@ -199,13 +190,6 @@ SEEN = Field(
 """NaN in inserted particles, which have seen none."""
 
 
-class WallTerms(NamedTuple):
-    """Extra drag beside walls."""
-
-    conductance: Array  # the largest in any direction (N,) [kg/s]
-    lacks: Array  # what the resistance lacks of it, by direction (N, 3, 3) [kg/s]
-
-
 class WallDrag(FluidForce):
     """Extra drag beside walls.
 
@@ -215,7 +199,7 @@ class WallDrag(FluidForce):
     shear   whether they resist sliding
     """
 
-    name, lines, fields = "wall_drag", ("drag",), (SEEN,)
+    name, lines, fields, by_direction = "wall_drag", ("drag",), (SEEN,), True
 
     def __init__(
         self, walls: Sequence[Wall], which: Literal["nearest", "all"], *, film: bool, shear: bool = False
@@ -227,9 +211,9 @@ class WallDrag(FluidForce):
         self._surfaces, self._options = (flat_walls.kind, flat_walls.shape), (which == "all", film, shear)
 
     def act(self, terms: ForceTerms) -> None:
-        """Resist the slip, by direction; the fluid is foreseen to change as much as in the last step."""
-        beside, flow, before = self.terms(terms.particles, terms.step), _flow(terms), terms.particles[SEEN.name]
-        terms.resist("drag", beside.conductance, beside.lacks)
+        """Resist the slip, by direction; beside slanting walls the fluid is foreseen to change as in the last step."""
+        flow, before = _flow(terms), terms.particles[SEEN.name]
+        terms.resist("drag", self.resistance(terms.particles, terms.step))
         if terms.last_step > 0.0:
             change = (terms.step / terms.last_step) * (flow - before)
             terms.foreseen = np.where(np.isnan(before), 0.0, 0.5 * change)  # drag sees the mean over the step
@@ -238,11 +222,11 @@ class WallDrag(FluidForce):
         """Store the fluid velocity before the step."""
         terms.particles[SEEN.name][:] = _flow(terms)
 
-    def terms(self, particles: Particles, step: float = 0.0) -> WallTerms:
-        """Extra resistance of every particle over a step [s]."""
-        terms, way = WallTerms(np.empty(particles.count), np.empty((particles.count, 3, 3))), step * particles.velocity
-        _beside(particles.position, particles.radius, particles.viscosity, way, self._surfaces, self._options, terms)
-        return terms
+    def resistance(self, particles: Particles, step: float = 0.0) -> Array:
+        """Extra resistance of every particle over a step [s], by direction (N, 3, 3) [kg/s]."""
+        tensor, way = np.empty((particles.count, 3, 3)), step * particles.velocity
+        _beside(particles.position, particles.radius, particles.viscosity, way, self._surfaces, self._options, tensor)
+        return tensor
 
 
 def _flow(terms: ForceTerms) -> Array:
@@ -264,11 +248,10 @@ def _factors(gap, rise, film, shear):
 
 
 @inline
-def _beside_one(place, radius, viscosity, way, surfaces, options, n, terms):
+def _beside_one(place, radius, viscosity, way, surfaces, options, tensor):
     kind, shape = surfaces
     stokes, closest = 6.0 * math.pi * viscosity * radius, math.inf
-    largest, lacks = 0.0, terms.lacks[n]
-    lacks[:] = 0.0
+    tensor[:] = 0.0
     for w in range(len(kind)):
         normal, distance, _, _, _, _ = nearest(kind, shape, w, place)
         gap = max(distance / radius - 1.0, CLOSEST)
@@ -276,17 +259,14 @@ def _beside_one(place, radius, viscosity, way, surfaces, options, n, terms):
             continue
         closest = gap
         across, along = _factors(gap, dot(way, normal) / radius, options[1], options[2])
-        most = max(across, along)
-        largest = most + (largest if options[0] else 0.0)
         for d in range(3):
             for e in range(3):
-                lack = (most - along) * (d == e) + (along - across) * normal[d] * normal[e]
-                lacks[d, e] = stokes * lack + (lacks[d, e] if options[0] else 0.0)
-    terms.conductance[n] = stokes * largest
+                more = along * (d == e) + (across - along) * normal[d] * normal[e]
+                tensor[d, e] = stokes * more + (tensor[d, e] if options[0] else 0.0)
 
 
 @threaded
-def _beside(position, radius, viscosity, way, surfaces, options, terms):
+def _beside(position, radius, viscosity, way, surfaces, options, tensor):
     """Resistance of every particle on its way over a step [m]."""
     for n in prange(len(radius)):
-        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(way, n), surfaces, options, n, terms)
+        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(way, n), surfaces, options, tensor[n])
