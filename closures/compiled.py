@@ -101,17 +101,23 @@ def _use_wide_vectors() -> None:
     that gathers eight numbers takes longer than eight loads. The results are the same bits.
     """
     import llvmlite.binding as processor
+    from numba import config
 
-    if any(f"NUMBA_{name}" in os.environ for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")):
+    if config.CPU_NAME or config.CPU_FEATURES or not config.ENABLE_AVX:  # type: ignore[attr-defined]
         return  # the user's own choice
     try:
         features = processor.get_host_cpu_features()
     except RuntimeError:  # LLVM does not know this processor
         return
     if features.get("avx512f"):
-        by_loads = processor.get_host_cpu_name().startswith("znver") and processor.llvm_version_info[0] >= 17
-        gathers = ",+prefer-no-gather" if by_loads else ""
-        _set_compiler("CPU_FEATURES", f"{features.flatten()},-prefer-256-bit{gathers}")
+        wide = _wide_vectors(processor.get_host_cpu_name(), processor.llvm_version_info[0])
+        _set_compiler("CPU_FEATURES", f"{features.flatten()},{wide}")
+
+
+def _wide_vectors(processor: str, llvm: int) -> str:
+    """Settings of a processor with AVX-512, by its name and the version of LLVM, for `_use_wide_vectors`."""
+    loads_faster = processor.startswith("znver") and llvm >= 17  # older versions do not know the setting
+    return "-prefer-256-bit" + ",+prefer-no-gather" * loads_faster
 
 
 _EXPOSED: set[Callable[..., float]] = set()

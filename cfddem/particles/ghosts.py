@@ -405,4 +405,8 @@ def films_with_ghosts(
         "best_factor": best_factor.py_func,
         "settled": settled.py_func,
     }
-    return renamed(film_kick.py_func, "film_kick_with_ghosts", on_ranks)
+    loop = film_kick.py_func
+    left = {name for name in loop.__code__.co_names if hasattr(loop.__globals__.get(name), "py_func")} - on_ranks.keys()
+    if left:  # they would run without the laws of the case, and without what other ranks have found
+        raise LookupError(f"phases of film_kick that ranks lack: {', '.join(sorted(left))}")
+    return renamed(loop, "film_kick_with_ghosts", on_ranks)

@@ -65,6 +65,15 @@ def test_loops_use_the_widest_vectors_of_the_processor() -> None:
     assert "-prefer-256-bit" in config.CPU_FEATURES.split(",")  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(
+    "processor, llvm, by_loads", [("znver4", 20, True), ("znver4", 15, False), ("sapphirerapids", 20, False)]
+)
+def test_processors_of_amd_load_numbers_one_by_one(processor: str, llvm: int, by_loads: bool) -> None:
+    from closures.compiled import _wide_vectors
+
+    assert ("+prefer-no-gather" in _wide_vectors(processor, llvm).split(",")) == by_loads
+
+
 @threaded
 def counted(numbers: np.ndarray) -> None:
     for n in prange(len(numbers)):

@@ -277,9 +277,6 @@ def agglomerates(first: Numbers, second: Numbers, count: int) -> Numbers:
     return np.asarray(connected_components(joined, directed=False)[1])
 
 
-# ---------------------------------------------------------------- sizes of agglomerates
-
-
 class AgglomerateSizes(NamedTuple):
     """Sizes of all agglomerates, as numbers of particles; a particle without a bridge is one of size 1."""
 
@@ -309,10 +306,10 @@ def agglomerate_sizes(first: Numbers, second: Numbers, count: int) -> Agglomerat
     if count == 0:
         return AgglomerateSizes(float("nan"), 0, float("nan"))
     members = np.bincount(agglomerates(first, second, count)).astype(float)  # local: numbers of all ranks
-    alone = float(np.count_nonzero(members == 1.0))  # local: likewise
+    alone = float(np.count_nonzero(members == 1.0))  # local: numbers of all ranks
     return AgglomerateSizes(
-        mean_by_particle=float((members * members).sum()) / count,  # local: likewise
-        largest=int(members.max()),  # local: likewise
+        mean_by_particle=float((members * members).sum()) / count,  # local: numbers of all ranks
+        largest=int(members.max()),  # local: numbers of all ranks
         joined=1.0 - alone / count,
     )
 
