@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,8 +42,10 @@ MAPPED = Field(
     meaning="position from which the voidage was computed in the last fluid step",
 )  # fmt: skip
 
-RESPONSE = Field("response_rate", "1/s", role="memory", meaning="rate at which a particle took up the fluid's velocity")
-"""Along each axis where a force resists by direction."""
+RESPONSE = Field(
+    "response_rate", "1/s", 3, "memory",
+    meaning="rate at which a particle took up the fluid's velocity along each axis",
+)  # fmt: skip
 
 CROWDING = Field("crowding", "1", role="memory", meaning="solids over fluid around a particle in the last fluid step")
 
@@ -85,8 +86,7 @@ class Coupling:
         )
         self._mean_step = 0.0
         self.exchanged_impulse = np.zeros((0, 3))
-        response = replace(RESPONSE, components=3 if any(force.by_direction for force in forces) else 0)
-        own = (MAPPED, response, CROWDING, *self.flow.fields)
+        own = (MAPPED, RESPONSE, CROWDING, *self.flow.fields)
         for field in own:
             particles.declare(field)
         declared = [*(field.name for field in own), *self.momentum.declare(particles)]
@@ -158,7 +158,7 @@ class Coupling:
         self.forces.finish(terms)
         self.flow.remember(particles, terms.flow)
         particles.mapped_position = terms.cell_map.position
-        particles.response_rate = terms.response_rate
+        particles.response_rate[:] = terms.response_rate
         particles.crowding = (1.0 - terms.flow.voidage) / terms.flow.voidage
 
     def solid_fraction(self, particles: Particles) -> Array:
@@ -218,7 +218,7 @@ class Coupling:
         return self.kernel.wrapped(particles.position + ahead)
 
     def _foresight(self, particles: Particles, step: float) -> Array:
-        r"""Part w of their motion over the coming step by which particles are mapped ahead (N, 1) [-].
+        r"""Part w of their motion over the coming step by which particles are mapped ahead, along each axis (N, 3) [-].
 
         .. math:: w = \min\left(\frac{1}{1+\lambda^2},\;
                   s\,\frac{2-\Lambda}{k\,(2\Lambda + 4 r)}\right),\qquad
@@ -227,10 +227,10 @@ class Coupling:
         with :math:`\lambda` the step over the time in which the fluid takes a particle along, and r the mass of the
         displaced fluid over that of the particle. The second part is s times the largest w at which particles that
         move to and fro from step to step do so less and less: the fluid between them moves by the opposite of their
-        volume flux, which is mapped ahead, and drag and pressure act back on them. Where resistance depends on
-        direction, each axis has its own (N, 3): a bead that slides along a wall is not light because the wall holds it.
+        volume flux, which is mapped ahead, and drag and pressure act back on them. A bead that slides along a
+        wall is not light because the wall holds it: each axis has its own.
         """
-        response, crowding = step * columns(particles.response_rate), columns(particles.crowding)
+        response, crowding = step * particles.response_rate, columns(particles.crowding)
         drag = np.minimum(response * (1.0 + crowding) / (1.0 + response), 2.0)
         displaced = columns(self.fluid.density * particles.volume * particles.inverse_mass)
         largest = STABLE * (2.0 - drag) / np.maximum(crowding * (2.0 * drag + 4.0 * displaced), 1e-12)

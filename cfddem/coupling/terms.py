@@ -155,10 +155,10 @@ class ForceTerms:
 
     @property
     def response_rate(self) -> Array:
-        """Rate at which a particle takes up the velocity of the fluid (N,), or along each axis (N, 3) [1/s]."""
+        """Rate at which a particle takes up the velocity of the fluid (N, 1), or along each axis (N, 3) [1/s]."""
         if self.tensors:
             return np.asarray(by_axis(self.resistance, total(self.tensors, self.resistance)) / self.inertia[:, None])
-        return np.asarray(self.resistance / self.inertia)
+        return np.asarray(self.resistance / self.inertia)[:, None]
 
     def force(self, line: str) -> Array:
         """Force of a line on every particle (N, 3) [N]; zero for a line that the run lacks."""

@@ -337,7 +337,7 @@ def by_axis(conductance: Array, tensor: Array) -> Array:
 
 
 def slip_of(force: Array, conductance: Array, tensor: Array) -> Array:
-    """Slip at which the resistance has these forces (N, 3) [m/s]."""
+    """Slip at which the resistance has these forces; zero where there is none (N, 3) [m/s]."""
     slip = np.empty_like(force)
     _slip_of(force, conductance, tensor, slip)
     return slip
@@ -364,7 +364,9 @@ def _resistance(conductance, tensor, n):
 @threaded
 def _slip_of(force, conductance, tensor, slip):
     for n in prange(len(force)):
-        slip[n, 0], slip[n, 1], slip[n, 2] = solved(_resistance(conductance, tensor, n), of_row(force, n))
+        resists = conductance[n] + tensor[n, 0, 0] + tensor[n, 1, 1] + tensor[n, 2, 2] > 0.0
+        acting = solved(_resistance(conductance, tensor, n), of_row(force, n)) if resists else NOTHING
+        slip[n, 0], slip[n, 1], slip[n, 2] = acting
 
 
 @inline

@@ -457,7 +457,7 @@ class FluidSolver:
         same bits on the same number of ranks."""
         self.fields.restore(stored)
         self.time, fields, halo = float(stored["time"]), self.fields, self.boundaries.halo
-        for cells in (fields.mean_voidage, fields.viscosity):
+        for cells in (fields.mean_voidage, fields.viscosity, fields.drag, fields.drag_momentum, fields.source):
             halo.fill(cells)
         self.boundaries.fill_pressure(fields.pressure)
         self.boundaries.set_inlets(self.time, fields.mean_voidage)

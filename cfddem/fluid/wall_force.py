@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -48,20 +49,22 @@ def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Ar
 
 
 def pressure_fall(fluid: FluidSolver, axis: int) -> float:
-    """Mean pressure p' on the open faces of the low side of the box, less that on the high side [Pa]; of all ranks.
+    """Mean pressure p' over the open area of the low side of the box, less that of the high side [Pa]; of all ranks.
 
-    axis  0, 1, 2 for x, y, z; a periodic one has the fall that drives its flow
+    axis     0, 1, 2 for x, y, z; a periodic one has the fall that drives its flow
+    returns  NaN where a side has no open face
     """
     if fluid.boundaries.periodic[axis]:
         return float(fluid.boundaries.driving[axis] * fluid.grid.whole.size[axis])
     slope = fluid.cell_pressure_gradient()  # of all ranks, as in `loads_on_walls`
-    over = {False: np.zeros(0), True: np.zeros(0)}
+    force, area = ({False: np.zeros(0), True: np.zeros(0)} for _ in range(2))
     for side in fluid.boundaries.sides:
         if side.axis == axis:
-            open_cells = side.layer(fluid.grid.open, -1 if side.high else 0)
-            over[side.high] = pressure_on_side(fluid, side, slope)[open_cells]
+            area[side.high] = fluid.boundaries.open_share(side) * side.layer(fluid.grid.open, -1 if side.high else 0)
+            force[side.high] = area[side.high] * pressure_on_side(fluid, side, slope)
     total = fluid.communicator.sum
-    low, high = (float(total(faces)) / int(total(faces.size)) for faces in (over[False], over[True]))
+    forces, areas = ([float(total(of[high])) for high in (False, True)] for of in (force, area))
+    low, high = (f / a if a > 0.0 else math.nan for f, a in zip(forces, areas))
     return low - high
 
 

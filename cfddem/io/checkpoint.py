@@ -19,7 +19,7 @@ from cfddem.backend.errors import InputError, RunFailed
 from cfddem.backend.portions import Portions
 from cfddem.io.files import ArrayFile, disk_error, memory, opened, put, reason, require_format, write_hdf5
 
-FORMAT = 4
+FORMAT = 5
 """Format of checkpoints. Checkpoints of any other format are refused."""
 
 KEPT = 2

@@ -72,7 +72,6 @@ class FluidForce(Feature):
     late          whether it acts after the others, since it depends on their resistance
     sets_inertia  whether it changes the inertia of particles
     needs_fluid   whether it needs the flow around the particles
-    by_direction  whether it resists with a tensor
     sharp         whether the surfaces of beds are sharp in the flow that all forces see
     needs_sizes   whether it needs the diameter of each particle over the Sauter mean around it
     own           what every particle adds to the flow itself, which other forces do not see; of the type
@@ -88,7 +87,6 @@ class FluidForce(Feature):
     sets_inertia: bool = False
     needs_fluid: bool = True
     needs_sizes: bool = False
-    by_direction: bool = False
     sharp: bool = False
     own: Any = None
     outside: int = 0

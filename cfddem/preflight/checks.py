@@ -36,7 +36,7 @@ SOFT_OVERLAP, NOTED_OVERLAP, LARGEST_OVERLAP = 0.02, 0.04, 0.1
 
 Between the first two it is a note where only the fastest collisions overlap so far, or the flow carries the bed.
 Contacts four times stiffer change mean height and pressure drop of a slugging bed (gallery case `defluidisation`) by
-+2.2 and -0.6 %, with errors of 2.1 and 0.9 %, and the deviation of the pressure by +28 %, with an error of 10 %
++1.0 and -0.3 %, with errors of 2.2 and 0.5 %, and the deviation of the pressure by +16 %, with an error of 21 %
 (`cfddem validate beds`).
 """
 

@@ -89,7 +89,7 @@ def restored(
     """
     try:
         simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **arguments)
-    except (KeyError, IndexError, TypeError) as failure:
+    except (KeyError, IndexError, TypeError, ValueError) as failure:
         remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
         raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
     return simulation

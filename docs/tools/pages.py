@@ -24,7 +24,10 @@ ROOMS = {
     "cfddem/preflight": ("Pre-run check", "Estimates, warnings and errors before a run."),
     "cfddem/run": ("Run", "Simulation, time step, run folder, history, budgets."),
     "cfddem/studies": ("Studies", "Sweeps, samples, calibration, job arrays, a run in a notebook."),
-    "cfddem/features": ("Features", "What a case can turn on: feeds and outlets, heat, drying, bridges, energy budgets."),
+    "cfddem/features": (
+        "Features",
+        "What a case turns on: feeds and outlets, heat, drying, bridges, energy budgets.",
+    ),
     "cfddem/particles": (
         "Particles",
         "Discrete-element solver: contacts, films, bridges, walls, neighbours, packings.",

@@ -12,7 +12,7 @@ are therefore also put into finer cells, which shows the error of the cells with
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -268,6 +268,7 @@ class RefinementBed:
     case: Case
     averaged_from: float  # [s]
     until: float  # [s]
+    seeds: tuple[int, ...] = (1,)  # of the runs with stiffer contacts, and of those that they are compared with
 
 
 class Means(NamedTuple):
@@ -276,6 +277,19 @@ class Means(NamedTuple):
     height: Average  # [m]
     drop: Average  # [Pa]
     variance: Average  # of the pressure drop [Pa2]
+
+    @classmethod
+    def of_seeds(cls, runs: Sequence[Means]) -> Means:
+        """Means of runs that differ by their seed alone; errors by those of the runs, or by their scatter if larger."""
+        if len(runs) == 1:
+            return runs[0]
+        return cls(*(_of_seeds(averages) for averages in zip(*runs)))
+
+
+def _of_seeds(averages: Sequence[Average]) -> Average:
+    values, errors = np.array([(average.mean, average.error) for average in averages]).T
+    error = max(math.hypot(*errors) / len(values), float(values.std(ddof=1)) / len(values) ** 0.5)
+    return averages[0]._replace(mean=float(values.mean()), error=error)
 
 
 def liquid() -> RefinementBed:
@@ -293,7 +307,7 @@ def gas() -> RefinementBed:
     """Slugs of air in the narrow column of the gallery's ramp."""
     case = gallery()["defluidisation"]
     changes = {"title": "Slugging bed, for refinement", "bed.inlet_velocity": 0.6, "run.every": 0.25}
-    return RefinementBed(case.with_(**changes), 1.0, 6.0)
+    return RefinementBed(case.with_(**changes), 1.0, 6.0, seeds=(1, 2))
 
 
 def variants(case: Case) -> dict[str, tuple[dict[str, Any], str]]:
@@ -331,9 +345,12 @@ def refined(folder: Path, progress: Progress) -> list[Row]:
         by_change: dict[str, Means] = {}
         for change, (changes, other) in variants(bed.case).items():
             limits = {"run.until": bed.until, "run.average_from": bed.averaged_from}
-            by_change[change] = means(
-                finished(bed.case, folder, _home(name, change), progress, changes | limits), bed.averaged_from
-            )
+            runs = []
+            for seed in bed.seeds if "run.particle_step" in changes else (1,):
+                home = _home(name, change) + f"_seed_{seed}" * (seed > 1)
+                run = finished(bed.case, folder, home, progress, changes | limits | {"bed.seed": seed})
+                runs.append(means(run, bed.averaged_from))
+            by_change[change] = Means.of_seeds(runs)
             if other:
                 rows += compared(f"{name}, {change}", by_change[change], by_change[other], gusty=name != "liquid bed")
     progress("particles of the slugging gas bed in finer cells")

@@ -357,7 +357,7 @@ def test_crowded_particles_that_move_to_and_fro_are_not_mapped_ahead_too_far(den
     """v' = v - L (v + 2 w k v) - 4 r w k v, of drag and of the pressure that moves the fluid between them, decays."""
     simulation = stirred(suspension(**{"fluid.density": density}))
     particles, coupling, step = simulation.particles, simulation.coupling, 1e-3
-    ratio = density * particles.volume * particles.inverse_mass
+    ratio = (density * particles.volume * particles.inverse_mass)[:, None]
     for response, crowding in itertools.product((1.0, 100.0, 1e4), (0.01, 0.5, 1.5, 2.0)):
         particles.response_rate[:], particles.crowding[:] = response, crowding
         ahead, rate = coupling._foresight(particles, step), step * response

@@ -262,6 +262,8 @@ def test_each_axis_has_its_own_drag():
             fluid.step(1e-3, None, coefficient, coefficient * [0.3, -0.2, 0.1])
         ledger = budgets.momentum_ledger(fluid)
         assert ledger["change"] == pytest.approx(ledger["drag"], rel=1e-9)
+        worked = budgets.works(fluid)
+        assert worked.kinetic == pytest.approx(worked.drag + worked.implicit, rel=1e-9)
         return fluid.velocity
 
     by_axis = relaxed([10.0, 600.0, 1e5])

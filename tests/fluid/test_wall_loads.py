@@ -13,9 +13,9 @@ from cfddem.case.schema import Case
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Grid
-from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.solver import FluidSolver, Scheme
 from cfddem.fluid.surfaces import cylinder, turned
-from cfddem.fluid.wall_force import SMOOTH, loads_on_walls
+from cfddem.fluid.wall_force import SMOOTH, loads_on_walls, pressure_fall
 from cfddem.run.history import all_columns, pressure_drop, row, wall_load
 from cfddem.run.simulation import Simulation
 
@@ -80,6 +80,51 @@ def test_pressure_and_stress_on_a_cone_balance_what_flows_through_it() -> None:
     print(f"into the cone {pushed:.5g} N, out {left:.5g} N, on the walls {on_walls:.5g} N")
     assert abs(on_walls) > 0.2 * abs(pushed)
     assert pushed - left == pytest.approx(on_walls, abs=0.03 * (abs(pushed) + abs(on_walls)))
+
+
+def bed_of_two_layers(model: str) -> tuple[FluidSolver, np.ndarray, np.ndarray]:
+    """Fluid that flows steadily through particles at rest in the two lowest layers; voidage and drag coefficient."""
+    voidage, beta = np.ones((6, 4, 4)), np.zeros((6, 4, 4))
+    voidage[0], voidage[1], beta[0], beta[1] = 0.5, 0.6, 1e4, 5e3
+    sides, scheme = {"z_low": Inlet(0.1), "z_high": Outlet(pressure=7.0)}, Scheme(model=model)
+    grid = Grid((4, 4, 6), (0.01,) * 3)
+    fluid = FluidSolver(grid, sides, density=1.0, viscosity=1e-5, voidage=voidage, scheme=scheme)
+    for _ in range(40):
+        fluid.step(1e-3, None, beta)
+    return fluid, voidage, beta
+
+
+@pytest.mark.parametrize("model", ["A", "B"])
+def test_the_pressure_falls_by_what_particles_receive(model: str) -> None:
+    """Drag and pressure on particles, and the momentum that leaves less that at the inlet, up to viscous stress."""
+    fluid, voidage, beta = bed_of_two_layers(model)
+    weight, seen = fluid.drag_response()
+    received = (beta[..., None] * weight * seen)[..., 2]
+    if model == "A":
+        received = received - (1.0 - voidage) * fluid.cell_pressure_gradient()[2]
+    out, inwards = fluid.volume_flux(2)[-1] * fluid.face_velocity(2)[-1], fluid.volume_flux(2)[0] ** 2 / voidage[0]
+    expected = 0.01 * float(received.mean(axis=(1, 2)).sum()) + float((out - inwards).mean())
+    assert pressure_fall(fluid, 2) == pytest.approx(expected, rel=1e-4)
+    line = fluid.pressure.mean(axis=(1, 2))[:2] @ [1.5, -0.5] - 7.0  # through the two lowest cells
+    assert abs(line / expected - 1.0) > 0.02
+
+
+def test_the_pressure_on_sides_is_kept_in_a_checkpoint() -> None:
+    fluid, voidage, _ = bed_of_two_layers("B")
+    later = FluidSolver(
+        fluid.grid, {"z_low": Inlet(0.1), "z_high": Outlet(pressure=7.0)}, density=1.0, viscosity=1e-5,
+        voidage=voidage, scheme=Scheme(model="B"),
+    )  # fmt: skip
+    later.restore(fluid.checkpoint())
+    assert pressure_fall(later, 2) == pressure_fall(fluid, 2)
+
+
+def test_a_side_without_open_faces_has_no_pressure() -> None:
+    solid = np.zeros((6, 4, 4), bool)
+    solid[0] = True
+    fluid = FluidSolver(Grid((4, 4, 6), (0.01,) * 3, solid=solid), {}, density=1.0, viscosity=1e-5)
+    fluid.step(1e-3)
+    assert math.isnan(pressure_fall(fluid, 2)) and pressure_fall(fluid, 0) == pytest.approx(0.0, abs=1e-12)
 
 
 # ---------------------------------------------------------------- cases

@@ -199,7 +199,7 @@ class WallDrag(FluidForce):
     shear   whether they resist sliding
     """
 
-    name, lines, fields, by_direction = "wall_drag", ("drag",), (SEEN,), True
+    name, lines, fields = "wall_drag", ("drag",), (SEEN,)
 
     def __init__(
         self, walls: Sequence[Wall], which: Literal["nearest", "all"], *, film: bool, shear: bool = False
