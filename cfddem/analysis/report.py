@@ -58,7 +58,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         status=run.status,
         message=run.message,
         window=(begin, end),
-        films="" if case.bed.fixed else case.laws.film_in_words(case.around),
+        films="" if case.stands_still else case.laws.film_in_words(case.around),
         surface=case.surface_in_words,
         key_results=key_results(run, case, measures, laws, STATE in actions),
         measures=measures,
@@ -271,7 +271,7 @@ def _used(case: Case) -> Iterator[Law]:
         yield from (REGISTRY["lift"][name] for name in ("saffman_mei", "magnus") if laws.lift)
         yield from (REGISTRY["lift"][name] for name in ("torque",) if laws.torque)
         yield from (REGISTRY["wall_drag"][name] for name in ("towards_wall", "along_wall") if laws.wall_drag != "none")
-    if case.has_films and not case.bed.fixed:
+    if case.has_films and not case.stands_still:
         yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.film_in(case.around)), ()))
         yield laws.pair_laws.get("minimum_gap", REGISTRY["minimum_gap"]["elastohydrodynamic"])
         yield from (law for kind, law in laws.pair_laws.items() if kind == "lubrication")

@@ -206,8 +206,11 @@ class Bed(Species):
         if self.positions and self.start == "poured":
             object.__setattr__(self, "start", "placed")
         if bool(self.positions) != (self.start == "placed"):
-            limit = f'{"left out" if self.positions else "given"} with start = "{self.start}"'
-            raise InputError("positions", None, limit, "one centre [x, y, z] for each particle, or another start")
+            if self.positions:
+                remedy = 'leave out start, or set start = "placed"'
+                raise InputError("positions", None, f'left out with start = "{self.start}"', remedy)
+            remedy = "one centre [x, y, z] for each particle, or another start"
+            raise InputError("positions", None, 'given with start = "placed"', remedy)
         check_times("inlet_velocity", self.inlet_velocity)
         if self.lowest_inlet_velocity < 0.0:
             raise InputError(

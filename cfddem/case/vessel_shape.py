@@ -133,7 +133,10 @@ class CaseVessel(Checked):
             of_cone = "radius" if self.radius == widest else "top_radius"
             key = {"cylinder": "radius", "cone": of_cone, "chain": "line"}[self.shape]
             limit = f"within the column: at most {0.5 * min(width, depth):g} m"
-            raise InputError(f"vessel.{key}", widest, limit, "widen column.width and column.depth")
+            value, remedy = widest, "widen column.width and column.depth"
+            if key == "top_radius" and self.top_radius not in (None, widest):  # it goes on to the lid, or ends there
+                value, limit = self.top_radius, f"{limit} at the lid, where it is {widest:.4g} m"
+            raise InputError(f"vessel.{key}", value, limit, remedy)
 
     @property
     def is_upright(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable, Findings
 from cfddem.case.materials import Checked
@@ -131,6 +131,12 @@ class ContactHeat(FeatureTable):
                     raise InputError(f"contact_heat.{table}.{name}", value, nearest(name, list(case.material)))
                 if table == "emissivity" and value > 1.0:
                     raise InputError(f"contact_heat.emissivity.{name}", value, "0 to 1", "1 is a black body")
+        if self.held and case.feed:
+            remedy = "particles that stay where they are leave no room for others"
+            raise InputError("contact_heat.held", True, "false where there is a feed", remedy)
+        if self.held and any(case.bed.initial_velocity):
+            limit = "left out with contact_heat.held"
+            raise InputError("bed.initial_velocity", shown(case.bed.initial_velocity), limit, "no particle moves")
         names = wall_names(case)
         for name in self.wall:
             if name not in names:

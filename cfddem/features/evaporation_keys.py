@@ -77,7 +77,10 @@ NEARLY_ALL, HALF = 0.8, 0.5
 a gas of one humidity gets a warning [-]."""
 
 COLDEST, HOTTEST = 253.0, 640.0
-"""Temperatures of the gas between which the laws of water can be used [K]."""
+"""Temperatures of the gas, of particles and of a spray between which the laws of water can be used [K]."""
+
+LIKELY_CELSIUS = 200.0
+"""Temperature below which a number is likely to be meant in degrees Celsius [K]."""
 
 
 class Water(NamedTuple):
@@ -145,7 +148,9 @@ class Evaporation(FeatureTable):
         for where, temperature in of_water.items():
             if not COLDEST <= temperature <= HOTTEST:
                 limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
-                raise InputError(f"heat.{where}", temperature, limit, "the laws are those of water")
+                kelvin = f"temperatures are in K; did you mean {temperature + 273.15:.3g} K ({temperature:g} °C)?"
+                remedy = kelvin if temperature < LIKELY_CELSIUS else "the laws are those of water"
+                raise InputError(f"heat.{where}", temperature, limit, remedy)
         for name in self.drops:
             if name not in case.material:
                 raise InputError("evaporation.drops", name, nearest(name, list(case.material)))

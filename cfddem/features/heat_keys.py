@@ -314,7 +314,7 @@ def low_capacities(key: str, capacities: Mapping[str, float]) -> Findings:
     for name, value in capacities.items():
         if value < LOWEST_CAPACITY:
             reason = f"{value:.3g} J/kg/K is below that of any solid or fluid"
-            remedy = f"did you mean {1e3 * value:.4g} J/kg/K ({value:.3g} kJ/kg/K)?; water has 4180 J/kg/K, air 1007"
+            remedy = f"water has 4180, air 1007; did you mean {1e3 * value:.4g} J/kg/K ({value:.3g} kJ/kg/K)?"
             yield "warning", f"{key}.{name}".rstrip("."), reason, remedy
 
 

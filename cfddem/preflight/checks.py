@@ -111,6 +111,8 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
         "collisions at the reference speed": collision.overlap / species.diameter,
         "the weight of the bed": collision.resting_overlap / species.diameter,
     }
+    if case.stands_still:  # its contacts bear the weight of the start, and pass heat
+        del causes["collisions at the reference speed"]
     cause, part = max(causes.items(), key=lambda cause_and_share: cause_and_share[1])
     if part <= SOFT_OVERLAP:
         return
@@ -169,7 +171,8 @@ def needed_modulus(case: Case, collision: CollisionEstimate) -> float:
     if not case.laws.contact_law.takes("contact_modulus"):
         return 0.0
     solid = case.material_of(species)
-    parts = ((collision.overlap, 2.5), (collision.resting_overlap, 1.5))
+    colliding = 0.0 if case.stands_still else collision.overlap
+    parts = ((colliding, 2.5), (collision.resting_overlap, 1.5))
     if math.isinf(max(parts)[0]):
         return math.inf
     softer = solid.contact_modulus or solid.youngs_modulus
@@ -230,9 +233,9 @@ def check_gpu(case: Case) -> Iterator[Issue]:
 
 def check_steps(case: Case, steps: StepEstimate) -> Iterator[Issue]:
     """Check that the time step is stable and resolves a collision, and that averages begin before the end."""
-    step, scales = case.run.particle_step, steps.time_scales
+    step, scales = None if case.stands_still else case.run.particle_step, steps.time_scales
     remedy = f"use {scales.recommended:.2g} s, or leave it out"
-    if step is not None and step > scales.limit and not case.bed.fixed:
+    if step is not None and step > scales.limit:
         yield Issue(
             "error", "run.particle_step",
             f"{step:.3g} s is above the stability limit {scales.limit:.3g} s of the {scales.limiting} criterion",

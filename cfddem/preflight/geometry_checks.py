@@ -13,6 +13,7 @@ from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.patches import ENDS, PLACES, CasePatch, along, on_the_side, open_share_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, vessel_of
+from cfddem.case.vessel_shape import ROUND_OFF
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, Severity, percent
 from cfddem.preflight.wall_checks import enters
@@ -302,7 +303,7 @@ def check_vessel(case: Case) -> Iterator[Issue]:
             "use a larger radius; below about five diameters particles form arches",
         )  # fmt: skip
     top = case.vessel.length or max((height for height, _ in case.vessel.line), default=0.0)
-    if top > case.column.height:
+    if top > case.column.height * (1.0 + ROUND_OFF):
         in_mm = f"; did you mean {1e-3 * top:.3g} m ({top:.3g} mm)?" * (top > LARGE_SURFACE * case.column.height)
         yield Issue(
             "warning", f"vessel.{'length' if case.vessel.length else 'line'}",

@@ -49,7 +49,7 @@ def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     ratios = [species.sauter_diameter / case.bed.diameter for species in case.species.values()]
     if reason := outside(law, state, ratios):
         yield Issue("warning", "laws.drag", reason + _and(effect_of_drag(case, law, bed)), REMEDY, False)
-    added, agitation = case.laws.added_mass_law, case.agitation
+    added, agitation = case.laws.added_mass_law, "none" if case.stands_still else case.agitation
     if isinstance(added, Law) and (reason := outside(added, state, ratios)):
         yield Issue("warning", "laws.added_mass", reason + _and(_effect_of_added_mass(case, state)), REMEDY)
     if isinstance(agitation, Law) and (reason := outside(agitation, state)):

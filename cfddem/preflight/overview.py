@@ -59,7 +59,7 @@ def overview(
     return (
         *_particles_and_flow(case, bed),
         *_species(case, bed),
-        *_collisions_and_film(case, collision, steps.particle),
+        *_contacts(case, collision, steps.particle),
         *_bridges(wet),
         *(Row(*fields) for table in case.feature_tables for fields in table.numbers(case, bed)),
         *_equipment(case, bed),
@@ -114,10 +114,28 @@ def _species(case: Case, bed: BedEstimate) -> Iterator[Row]:
             yield Row(group, f"{name}: net force / weight", forces[name], "", note)
 
 
-def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) -> Iterator[Row]:
+COLLISIONS = "collisions and film"
+
+
+def _contacts(case: Case, collision: CollisionEstimate, step: float) -> Iterator[Row]:
+    """Numbers of contacts, without those of collisions and films where no particle moves."""
     if case.bed.fixed:
         return
-    group, diameter = "collisions and film", case.species[collision.species].diameter
+    group, diameter = COLLISIONS, case.species[collision.species].diameter
+    if not case.stands_still:
+        yield from _collisions_and_film(case, collision, step)
+    if case.laws.contact_law.takes("contact_modulus"):
+        yield Row(group, "contact modulus / real", collision.softening)
+    if not case.stands_still:
+        yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")
+        if collision.softening < 1.0:
+            yield Row(group, "overlap / diameter, real", collision.real_overlap / diameter, "", "with the real modulus")
+    resting = collision.resting_overlap / diameter
+    yield Row(group, "overlap / diameter, at rest", resting, "", "under the weight of the bed")
+
+
+def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) -> Iterator[Row]:
+    group = COLLISIONS
     note = f"between particles of {collision.species}" if case.bed.species else ""
     yield Row(group, "collision speed", collision.speed, "m/s", note)
     if films := case.laws.film_in_words(case.around):
@@ -135,13 +153,6 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) 
     if collision.film_damping_rate > 0.0:
         note = "of the smallest particles at the smallest gap; films limit no step"
         yield Row(group, "damping number X, largest", collision.film_damping_rate * step, "", note)
-    if case.laws.contact_law.takes("contact_modulus"):
-        yield Row(group, "contact modulus / real", collision.softening)
-    yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")
-    if collision.softening < 1.0:
-        yield Row(group, "overlap / diameter, real", collision.real_overlap / diameter, "", "with the real modulus")
-    resting = collision.resting_overlap / diameter
-    yield Row(group, "overlap / diameter, at rest", resting, "", "under the weight of the bed")
 
 
 def _bridges(wet: WetEstimate | None) -> Iterator[Row]:

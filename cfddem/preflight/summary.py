@@ -20,7 +20,7 @@ import numpy as np
 from cfddem.backend import html
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.backend.tables import line_width
-from cfddem.case.schema import Case
+from cfddem.case.schema import Case, require_case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
@@ -121,6 +121,7 @@ def preflight(case: Case) -> Preflight:
     >>> result.status, [round(row.value, 3) for row in result.rows if row.name.startswith("u / ")]
     ('ok', [1.867, 0.185])
     """
+    require_case(case)
     title = case.title or "case without a title"
     with np.errstate(all="ignore"):  # values that overflow are reported below
         return _preflight(case, title)

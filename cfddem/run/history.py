@@ -23,7 +23,7 @@ import numpy as np
 
 from cfddem.analysis import measures
 from cfddem.analysis.layers import FEWEST_LAYERS, LAYER
-from cfddem.backend.errors import InputError
+from cfddem.backend.errors import InputError, shown
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature
@@ -97,13 +97,15 @@ def measure(
 
         def values(simulation: Simulation) -> Mapping[str, float]:
             value = function(simulation)
-            if np.ndim(value):
-                raise InputError(f"measure {name}", np.shape(value), "one number", "take its mean, or one element")
             try:
+                if isinstance(value, str | bytes) or np.ndim(value):  # of a ragged list NumPy knows none
+                    raise ValueError
                 return {name: float(value)}
             except (TypeError, ValueError):
-                remedy = "return a float; NaN where there is no value"
-                raise InputError(f"measure {name}", str(value), "one number", remedy) from None
+                lists = isinstance(value, list | tuple | np.ndarray)
+                remedy = "take its mean, or one element" if lists else "return a float; NaN where there is no value"
+                found = np.shape(value) if isinstance(value, np.ndarray) else shown(value)
+                raise InputError(f"measure {name}", found, "one number", remedy) from None
 
         _declare(name, Measure(columns, values, shared))
         return function
@@ -172,7 +174,7 @@ def _is_agitated(case: Case) -> bool:
 
 
 def _has_moving_films(case: Case) -> bool:
-    return case.has_films and not case.bed.fixed
+    return case.has_films and not case.stands_still
 
 
 def _is_mixture(case: Case) -> bool:
@@ -252,7 +254,7 @@ def bed_voidage(simulation: Simulation) -> float:
 def bed_voidage_from_pressure(simulation: Simulation) -> float:
     """Mean voidage of the bed, from the pressure gradient within it."""
     particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case)
-    carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
+    carried = 0.0 if simulation.case.stands_still else abs(simulation.gravity[2])  # the flow need not carry it
     total, volume = simulation.communicator.sum, particles.volume
     weight = (total(particles.density * volume) / total(volume) - fluid.density) * carried
     low, high = (share * bed_height(simulation) for share in BED)

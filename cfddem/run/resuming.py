@@ -108,8 +108,9 @@ def require_measures(written: RunFolder, case: Case) -> None:
 
 CHANGEABLE = (
     "title", "compare.*", "bed.inlet_velocity", "bed.seed", "fluid.viscosity", "fluid.viscosity_profile",
-    "heat.inlet_temperature", "heat.wall_temperature.*", "heat.patch_temperature.*", "patch.NAME.velocity",
-    "patch.NAME.mass_flow", "run.until", "run.every", "run.history_every",
+    "bed.jet.velocity", "heat.inlet_temperature", "heat.outlet_temperature", "heat.wall_temperature.*",
+    "heat.patch_temperature.*", "vapour.inlet_fraction", "vapour.outlet_fraction", "vapour.patch_fraction.*",
+    "patch.NAME.velocity", "patch.NAME.mass_flow", "run.until", "run.every", "run.history_every",
     "run.average_from", "run.until_error.*", "run.particle_step", "run.fluid_step", "run.reference_speed",
     *(f"{table}.{key}" for table in ("material.NAME", "pair.NAME.NAME") for key in (
         "youngs_modulus", "contact_modulus", "poisson", "restitution", "friction", "rolling_friction",

@@ -169,6 +169,7 @@ def test_a_vessel_survives_text_and_commands(tmp_path: Path):
     ("given", "said"),
     [
         ({"vessel.top_radius": 0.1}, "vessel.top_radius = 0.1: must be within the column: at most 0.08 m"),
+        ({"vessel.top_radius": 3.0, "vessel.length": 9.0}, r"vessel.top_radius = 3.0: .* at the lid, where it is 0\.\d"),
         ({"vessel.radius": 30.0}, "vessel.radius = 30.0: must be within the column: at most 0.08 m"),
         ({"vessel.line": [[0.0, 0.01], [0.1, 0.02]]}, 'vessel.line = .*left out for shape = "cone"'),
         ({"vessel": {"shape": "chain", "line": [[0.0, 0.03], [0.1, 0.05], [0.05, 0.06]]}}, "rising heights, but 0.05"),

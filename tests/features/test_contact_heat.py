@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from in_process_ranks import on_ranks
 
+from cfddem.analysis.report import references_of
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.contact_heat import HeatExchangeOfContacts
 from cfddem.features.contact_heat_keys import wall_names
 from cfddem.preflight.summary import preflight
-from cfddem.run.history import row
+from cfddem.run.history import all_columns, bed_voidage_from_pressure, row
 from cfddem.run.simulation import Simulation
 from scenarios.validation import heated_bed
 from scenarios.validation.heat.spheres import COLD, GAS, HEAT, HOT, RADII, exact_cases, two_spheres
@@ -234,6 +235,43 @@ def test_wrong_input_is_refused_in_one_line(heat: dict[str, Any], message: str) 
 def test_fixed_particles_have_no_forces_and_are_refused_with_the_remedy() -> None:
     with pytest.raises(InputError, match=re.escape("contact_heat.held = true")):
         two_spheres(0.0, 0.1, 1.0, bed__fixed=True)
+
+
+def test_held_particles_have_no_feed_and_no_velocity() -> None:
+    feed = {"corner": (0.0, 0.0, 0.005), "size": (0.045, 0.02, 0.005), "rate": 1.0, "species": "cold"}
+    with pytest.raises(InputError, match="contact_heat.held = True: must be false where there is a feed"):
+        two_spheres(0.0, 0.1, 1.0, feed=[feed])
+    with pytest.raises(InputError, match="bed.initial_velocity = .*: must be left out with contact_heat.held"):
+        two_spheres(0.0, 0.1, 1.0, bed__initial_velocity=(0.0, 0.0, -1.0))
+
+
+def held_bed(**changes: Any) -> Case:
+    """Particles that are held in a stream of water, with keys of a bed that moves."""
+    heat = {"held": True, "particle_temperature": None, "heat_capacity": {}}
+    of_both = {"particle_temperature": COLD, "heat_capacity": HEAT["heat_capacity"]}
+    of_water = {"fluid_temperature": COLD, "conductivity": 0.6, "fluid_heat_capacity": 4180.0}
+    return two_spheres(
+        -1.33e-7, 0.01, 1.0, heat, fluid={"density": 998.0, "viscosity": 1e-3}, bed__inlet_velocity=0.01,
+        heat=of_water | of_both, column__cell=(0.015, 0.01, 0.0054), laws__gravity=(0.0, 0.0, -9.81),
+        laws__lubrication="nijssen", laws__drag="gidaspow_smooth", **changes,
+    )  # fmt: skip
+
+
+def test_a_held_bed_has_no_numbers_of_beds_that_move() -> None:
+    """No collisions, films or steps of particles, and no weight that the flow carries."""
+    case = held_bed(run__reference_speed=30.0, run__particle_step=1.0)
+    checked = preflight(case)
+    keys = {"run.particle_step", "laws.agitation", "material.light.youngs_modulus", "material.heavy.youngs_modulus"}
+    assert not keys & {issue.key for issue in checked.issues}, checked.issue_lines()
+    names = {row.name for row in checked.rows if row.group == "collisions and film"}
+    assert "overlap / diameter, at rest" in names
+    assert names <= {"overlap / diameter, at rest", "contact modulus / real"}
+    columns = all_columns(case)
+    assert not {name for name in columns if "film" in name}
+    simulation = Simulation(case)
+    simulation.step()
+    assert math.isnan(bed_voidage_from_pressure(simulation))
+    assert not any("lubrication" in citation.kind for citation in references_of(case))
 
 
 def test_check_warns_of_a_circle_of_softened_contacts() -> None:

@@ -154,12 +154,22 @@ def test_particles_from_files(tmp_path: Path) -> None:
     for text, said in (
         ("x [mm],y,z,diameter\n1,2,3,4\n", "scale = 1.0: must be 0.001, as x in wrong.csv is in mm"),
         ("x,y,z,diameter [inch]\n1,2,3,4\n", "unit of diameter in wrong.csv = 'inch': must be one of m, cm"),
+        ("x [mm],y [mm],z [mm],diameter [um]\n1,2,3,4\n", "x in mm, y in mm, z in mm, diameter in um'"),
+        ("x [mm],y,z,diameter [um]\n1,2,3,4\n", "must be one unit for x, y, z and diameter"),
         ("x,y,z,diameter,density [g/cm3]\n1,2,3,4,5\n", "unit of density in wrong.csv"),
         ("x,y,z,diameter\n", "must be rows of numbers below a line of names"),
     ):
         wrong.write_text(text)
         with pytest.raises(InputError, match=re.escape(said)):
             read_particles(wrong, density=1.0)
+    for mu in ("u", "\N{MICRO SIGN}", "\N{GREEK SMALL LETTER MU}"):
+        for of_density in ("kg/m3", "kg/m^3", "kg/m\N{SUPERSCRIPT THREE}", "kg m-3"):
+            header = f"x [{mu}m],y [{mu}m],z,diameter [{mu}m],density [{of_density}],material [number]"
+            wrong.write_text(f"{header}\n1,2,3,4,5,0\n", encoding="utf-8-sig")
+            assert read_particles(wrong, scale=1e-6).density.tolist() == [5.0]
+    wrong.write_bytes("x [\N{MICRO SIGN}m],y,z,diameter\n1,2,3,4\n".encode("latin-1"))
+    with pytest.raises(InputError, match="must be a text in UTF-8"):
+        read_particles(wrong, density=1.0)
     wrong.write_text("x,y,z,diameter\n1,2,3,4\n1,2,three,4\n")
     with pytest.raises(InputError, match="particle 1"):
         read_particles(wrong, density=1.0)

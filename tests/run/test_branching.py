@@ -13,11 +13,16 @@ from made_up_run import BED, made_up
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.features.heat import HeatExchange
+from cfddem.features.vapour import Vapour
 from cfddem.io.reading import open_run
+from cfddem.preflight.summary import preflight
 from cfddem.run.check import check
 from cfddem.run.resuming import branch_state
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
+from cfddem.studies.notebook import run_case
+from scenarios.validation.heat.packed import lattice, packed
 
 TINY = ("start=suspended", "bed.count=50", "run.until=0.01", "run.every=0.005", "run.average_from=0")
 
@@ -79,6 +84,27 @@ def test_the_flow_through_a_patch_can_change(tmp_path: Path) -> None:
     assert leaving == pytest.approx(0.06, rel=0.01)  # at the centres of cells
 
 
+def test_a_jet_and_what_inlets_bring_can_change(tmp_path: Path) -> None:
+    """Temperatures and vapour of what flows in, or back, are those of the new case."""
+    more = {"fluid_fraction": 0.0, "diffusivity": 2.5e-5}
+    case = packed(
+        bed__positions=lattice(4e-3, (2, 2, 2)), bed__jet={"velocity": 1.0, "width": 4e-3}, run__until=0.002,
+        vapour=more,
+    )  # fmt: skip
+    Run.begin(case, tmp_path / "bed").go()
+    changes = {
+        "bed.jet.velocity": 2.0, "heat.inlet_temperature": 350.0, "heat.outlet_temperature": 320.0,
+        "vapour.inlet_fraction": 0.01, "vapour.outlet_fraction": 0.02, "run.until": 0.004,
+    }  # fmt: skip
+    branch = Run.begin(case.with_(**changes), tmp_path / "other", origin=tmp_path / "bed")
+    simulation = branch.simulation
+    branch.go()
+    assert simulation.fluid.whole("velocity")[0, ..., 2].max() > 1.2
+    heat, vapour = simulation.feature(HeatExchange).cells, simulation.feature(Vapour).cells
+    assert heat is not None and heat.value.max() > 310.0
+    assert 1e-4 < vapour.value.max() < 0.01
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -119,7 +145,10 @@ def test_a_case_beside_from_and_a_folder_without_a_run_are_refused(bed: Path, tm
 
 def test_what_is_no_case_is_named() -> None:
     for wrong in ("bed.toml", {"bed": {}}):
-        for use in (check, Simulation, lambda case: Run.begin(case, Path("unwritten"))):
+        for use in (
+            check, preflight, Simulation,
+            lambda case: Run.begin(case, Path("unwritten")), lambda case: run_case(case, Path("unwritten")),
+        ):  # fmt: skip
             with pytest.raises(InputError, match=r"must be a Case; Case.from_toml\(path\) reads a file"):
                 use(wrong)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -242,8 +243,14 @@ def _positive(name: str, value: float) -> None:
 
 COLUMNS = ("x", "y", "z", "diameter", "density", "material")
 
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 """Units of length of a header [m]."""
+
+DENSITIES = ("kg/m3", "kg/m^3", "kg/m\N{SUPERSCRIPT THREE}", "kg m-3")
+"""How a header may write the unit of density."""
+
+MICRO = ("\N{MICRO SIGN}", "\N{GREEK SMALL LETTER MU}")
+"""How a header may write the u of um."""
 
 
 def read_particles(path: str | Path, density: float | None = None, material: int = 0, scale: float = 1.0) -> Particles:
@@ -282,15 +289,19 @@ def read_particles(path: str | Path, density: float | None = None, material: int
 
 
 def _columns(path: Path, scale: float) -> dict[str, np.ndarray]:
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("particles", str(path), "a text in UTF-8", "save the table as CSV in UTF-8") from None
+    lines = [line for line in text.splitlines() if line.strip() and line[0] != "#"]
     if len(lines) < 2:
         raise InputError(f"particles in {path.name}", None, "rows of numbers below a line of names", "it has none")
     headings = [heading.partition("[") for heading in lines[0].split(",")]
     names = [name.strip() for name, _, _ in headings]
-    for name, unit in zip(names, (unit.strip("] \t") for _, _, unit in headings)):
+    for name in names:
         if name not in COLUMNS:
             raise InputError(f"column in {path.name}", name, nearest(name, COLUMNS))
-        _require_unit(f"{name} in {path.name}", name, unit, scale)
+    _require_units(path.name, {name: unit.strip("] \t") for name, (_, _, unit) in zip(names, headings)}, scale)
     try:
         table = np.genfromtxt(path, delimiter=",", skip_header=_lines_before_numbers(path), ndmin=2)
     except ValueError as refusal:
@@ -303,18 +314,26 @@ def _columns(path: Path, scale: float) -> dict[str, np.ndarray]:
     return columns
 
 
-def _require_unit(column: str, name: str, unit: str, scale: float) -> None:
-    """Refuse a unit of a header that is not the one in which its column is read; none is any."""
-    is_length = name in ("x", "y", "z", "diameter")
-    units = [*LENGTHS] if is_length else {"density": ["kg/m3"]}.get(name, ["-"])
-    if unit and unit not in units:
-        raise InputError(f"unit of {column}", unit, f"one of {', '.join(units)}")
-    if unit and is_length and not math.isclose(LENGTHS[unit], scale):
-        raise InputError("scale", scale, f"{LENGTHS[unit]:g}, as {column} is in {unit}")
+def _require_units(file: str, units: Mapping[str, str], scale: float) -> None:
+    """Refuse units of a header that are not those in which its columns are read; none is any."""
+    lengths = {}
+    for name, unit in units.items():
+        plain = "u" + unit[1:] if unit.startswith(MICRO) else unit
+        allowed = {"density": DENSITIES, "material": (unit,)}.get(name, (*LENGTHS,))  # a material is a number
+        if unit and plain not in allowed:
+            raise InputError(f"unit of {name} in {file}", unit, f"one of {', '.join(allowed)}")
+        if unit and plain in LENGTHS and name in ("x", "y", "z", "diameter"):
+            lengths[name] = plain
+    if len({*lengths.values()}) > 1:
+        found = ", ".join(f"{name} in {unit}" for name, unit in lengths.items())
+        raise InputError(f"units in {file}", found, "one unit for x, y, z and diameter", "write all in the same")
+    for name, unit in lengths.items():
+        if not math.isclose(LENGTHS[unit], scale):
+            raise InputError("scale", scale, f"{LENGTHS[unit]:g}, as {name} in {file} is in {unit}")
 
 
 def _lines_before_numbers(path: Path) -> int:
-    with path.open(encoding="utf-8") as lines:
+    with path.open(encoding="utf-8-sig") as lines:
         for number, line in enumerate(lines):
             if line.strip() and not line.startswith("#"):
                 return number + 1
