@@ -111,7 +111,7 @@ def test_a_measure_is_one_number_and_has_a_unit(tmp_path: Path) -> None:
         history.MEASURES["<lambda>"].values(None)
     for wrong in ([[1.0], [1.0, 2.0]], "3.5", "words " * 100):
         measure("m")(lambda simulation, wrong=wrong: wrong)
-        with pytest.raises(InputError, match="measure <lambda> = .*: must be one number") as failure:
+        with pytest.raises(InputError, match=r"measure <lambda> = .*: must be one number") as failure:
             history.MEASURES["<lambda>"].values(None)
         assert len(str(failure.value)) < 200
     history.forget("<lambda>")

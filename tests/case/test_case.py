@@ -255,7 +255,7 @@ def test_places_go_with_a_placed_start_and_with_no_other() -> None:
         Case.from_text(TEXT, "bed.toml", {"bed.start": "placed"})
     places = {"bed.count": None, "bed.positions": [[0.02, 0.02, 0.02]]}
     assert Case.from_text(TEXT, "bed.toml", places).bed.start == "placed"
-    with pytest.raises(InputError, match=r'left out with start = "suspended"; leave out start, or set start = "placed"'):
+    with pytest.raises(InputError, match=r'with start = "suspended"; leave out start, or set start = "placed"'):
         Case.from_text(TEXT, "bed.toml", {**places, "bed.start": "suspended"})
 
 

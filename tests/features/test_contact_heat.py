@@ -239,9 +239,9 @@ def test_fixed_particles_have_no_forces_and_are_refused_with_the_remedy() -> Non
 
 def test_held_particles_have_no_feed_and_no_velocity() -> None:
     feed = {"corner": (0.0, 0.0, 0.005), "size": (0.045, 0.02, 0.005), "rate": 1.0, "species": "cold"}
-    with pytest.raises(InputError, match="contact_heat.held = True: must be false where there is a feed"):
+    with pytest.raises(InputError, match=r"contact_heat.held = True: must be false where there is a feed"):
         two_spheres(0.0, 0.1, 1.0, feed=[feed])
-    with pytest.raises(InputError, match="bed.initial_velocity = .*: must be left out with contact_heat.held"):
+    with pytest.raises(InputError, match=r"bed.initial_velocity = .*: must be left out with contact_heat.held"):
         two_spheres(0.0, 0.1, 1.0, bed__initial_velocity=(0.0, 0.0, -1.0))
 
 
@@ -261,7 +261,7 @@ def test_a_held_bed_has_no_numbers_of_beds_that_move() -> None:
     """No collisions, films or steps of particles, and no weight that the flow carries."""
     case = held_bed(run__reference_speed=30.0, run__particle_step=1.0)
     checked = preflight(case)
-    keys = {"run.particle_step", "laws.agitation", "material.light.youngs_modulus", "material.heavy.youngs_modulus"}
+    keys = {"run.particle_step", "laws.agitation", "material.light.contact_modulus", "material.heavy.contact_modulus"}
     assert not keys & {issue.key for issue in checked.issues}, checked.issue_lines()
     names = {row.name for row in checked.rows if row.group == "collisions and film"}
     assert "overlap / diameter, at rest" in names
