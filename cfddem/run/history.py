@@ -104,8 +104,8 @@ def measure(
             except (TypeError, ValueError):
                 lists = isinstance(value, list | tuple | np.ndarray)
                 remedy = "take its mean, or one element" if lists else "return a float; NaN where there is no value"
-                found = np.shape(value) if isinstance(value, np.ndarray) else shown(value)
-                raise InputError(f"measure {name}", found, "one number", remedy) from None
+                brief = np.shape(value) if isinstance(value, np.ndarray) else shown(value)
+                raise InputError(f"measure {name}", brief, "one number", remedy) from None
 
         _declare(name, Measure(columns, values, shared))
         return function

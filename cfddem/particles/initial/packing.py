@@ -325,8 +325,8 @@ def _require_units(file: str, units: Mapping[str, str], scale: float) -> None:
         if unit and plain in LENGTHS and name in ("x", "y", "z", "diameter"):
             lengths[name] = plain
     if len({*lengths.values()}) > 1:
-        found = ", ".join(f"{name} in {unit}" for name, unit in lengths.items())
-        raise InputError(f"units in {file}", found, "one unit for x, y, z and diameter", "write all in the same")
+        several = ", ".join(f"{name} in {unit}" for name, unit in lengths.items())
+        raise InputError(f"units in {file}", several, "one unit for x, y, z and diameter", "write all in the same")
     for name, unit in lengths.items():
         if not math.isclose(LENGTHS[unit], scale):
             raise InputError("scale", scale, f"{LENGTHS[unit]:g}, as {name} in {file} is in {unit}")
