@@ -88,8 +88,8 @@ def test_a_jet_and_what_inlets_bring_can_change(tmp_path: Path) -> None:
     """Temperatures and vapour of what flows in, or back, are those of the new case."""
     more = {"fluid_fraction": 0.0, "diffusivity": 2.5e-5}
     case = packed(
-        bed__positions=lattice(4e-3, (2, 2, 2)), bed__jet={"velocity": 1.0, "width": 4e-3}, run__until=0.002,
-        vapour=more,
+        bed__positions=lattice(4e-3, (2, 2, 2)), bed__jet={"velocity": 1.0, "width": 5e-3},
+        column__width=0.012, run__until=0.002, vapour=more,
     )  # fmt: skip
     Run.begin(case, tmp_path / "bed").go()
     changes = {
