@@ -89,6 +89,8 @@ def restored(
     """
     try:
         simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **arguments)
+    except InputError:  # a ValueError that has its own words
+        raise
     except (KeyError, IndexError, TypeError, ValueError) as failure:
         remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
         raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
