@@ -180,8 +180,11 @@ def _drop(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawCompari
         if row.law.startswith(opening):
             expected = row.law.removeprefix(opening)
             words, holds = agreement(drop.mean, drop.error, row.expected, expected)
-            rubs = holds is False and drop.mean > row.expected and case.has_sticky_sides
-            more = "friction of the fluid at the sides adds to it" if rubs else ""
+            above, more = holds is False and drop.mean > row.expected, ""
+            if above and case.has_sticky_sides:
+                more = "friction of the fluid at the sides adds to it"
+            elif above and case.stands_still and case.bed.start == "poured":
+                more = "a poured bed is denser inside than its mean, which counts the loose layers at floor and surface"
             yield _mean("pressure drop", drop, "; ".join(filter(None, (words, more, _shallow(case, measures)))), holds)
             return
     yield _mean("pressure drop", drop, _shallow(case, measures), None)

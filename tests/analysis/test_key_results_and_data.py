@@ -91,6 +91,8 @@ def test_a_bed_that_a_table_holds_is_judged_as_a_fixed_one(tmp_path: Path) -> No
     found = report(made_up(tmp_path / "run", slow))
     assert next(each.value for each in found.key_results if each.name == "regime") == "fixed bed"
     assert [law.law for law in found.laws] == ["pressure drop by di_felice", "pressure drop by Ergun"]
+    drop = next(each for each in found.key_results if each.name == "pressure drop")  # made up, far above the law
+    assert drop.holds is False and "a poured bed is denser inside than its mean" in str(drop.verdict)
     checked = preflight(Case.from_text(slow))
     assert "u_mf" not in {row.name for row in checked.rows}
     assert not [each for each in checked.issues if "fluidisation" in each.reason or "bed.fixed" in each.remedy]
