@@ -257,10 +257,10 @@ def with_ghosts(widths: Sequence[np.ndarray], reach: float) -> np.ndarray:
     return np.einsum("x,y,z->xyz", *lines)
 
 
-def parsed(text: str) -> Shape:
+def division_of(text: str) -> Shape:
     """The shape that a text such as "2x2x1" names.
 
-    >>> parsed("2x2x1")
+    >>> division_of("2x2x1")
     (2, 2, 1)
     """
     parts = text.lower().split("x")

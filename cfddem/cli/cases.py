@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from cfddem.backend.communicator import parsed
+from cfddem.backend.communicator import division_of
 from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
 from cfddem.backend.law_choice import import_laws
@@ -135,7 +135,7 @@ def check(
     from cfddem.io.files import require_folder
     from cfddem.run.check import check as checked
 
-    shape = parsed(division) if division else None
+    shape = division_of(division) if division else None
     ranks = math.prod(shape) if shape and not ranks else ranks
     described = changes.case(find_case(case))
     result = checked(described, ranks, shape)

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, NoReturn
 
-from cfddem.backend.communicator import Communicator, parsed
+from cfddem.backend.communicator import Communicator, division_of
 from cfddem.backend.errors import InputError, failure_elsewhere
 from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, python_command, require_mpi4py
 from cfddem.cli.json_output import asked_for_json, print_failure
@@ -46,7 +46,7 @@ def on_ranks(ranks: int | None, threads: int | None, folder: Path, division: str
     started = launched()
     if ranks is not None and ranks < 1:
         raise InputError("--ranks", ranks, "at least 1")
-    shape = parsed(division) if division else None
+    shape = division_of(division) if division else None
     if shape:
         if ranks and ranks != math.prod(shape):
             raise InputError("--division", division, f"of {ranks} ranks in all, as --ranks says")
